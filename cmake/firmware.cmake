@@ -19,6 +19,7 @@
 #   BMS_CAN        slcan, or bxcan with a bit rate
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
 #   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
+#   BMS_PRECHARGE_S, BMS_CLOSING_A, BMS_CLOSING_OHM  of the truck, see boards/README.md; also as -DBMS_PRECHARGE_S=S
 #   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
@@ -35,11 +36,20 @@
 # IMAGE_shared compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
-set(cells_wanted ${BMS_CELLS})
+set(of_pack_and_truck CELLS PRECHARGE_S CLOSING_A CLOSING_OHM)
+foreach(value ${of_pack_and_truck})
+  set(wanted_${value} ${BMS_${value}})
+endforeach()
 include(${root}/boards/${BMS_BOARD}/board.cmake)
-if(cells_wanted)
-  set(BMS_CELLS ${cells_wanted})
-endif()
+set(of_truck)
+foreach(value ${of_pack_and_truck})
+  if(wanted_${value})
+    set(BMS_${value} ${wanted_${value}})
+  endif()
+  if(BMS_${value})
+    list(APPEND of_truck ${value} ${BMS_${value}})
+  endif()
+endforeach()
 if(NOT BMS_CELLS MATCHES "^[0-9]+$" OR BMS_CELLS LESS BMS_FEWEST_CELLS OR BMS_CELLS GREATER BMS_MOST_CELLS)
   message(FATAL_ERROR "BMS_CELLS is ${BMS_CELLS}, but the board ${BMS_BOARD} measures from ${BMS_FEWEST_CELLS} to "
     "${BMS_MOST_CELLS} cells in series. More than 16 cells need two monitoring chips: docs/packs_of_24_cells.md")
@@ -67,7 +77,7 @@ if(NOT DEFINED BMS_DC_LINK)
   set(BMS_DC_LINK true)
 endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
-  CELLS ${BMS_CELLS} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
+  ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 

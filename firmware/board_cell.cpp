@@ -1,7 +1,7 @@
 // Functions of the board other than the estimator step. They are compiled for size, not for speed.
 #include "firmware/board_cell.hpp"
 
-#include "firmware/board_design.hpp"
+#include "firmware/board_pack.hpp"
 
 namespace bms::firmware {
 
@@ -19,10 +19,10 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  constexpr auto design = board_design();
-  static_assert(protection::current_sensor_suffices(design),
+  static_assert(possible_truck(board_pack), "BMS_PRECHARGE_S, BMS_CLOSING_A or BMS_CLOSING_OHM is out of range");
+  static_assert(protection::current_sensor_suffices(board_pack),
                 "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
-  static constexpr auto plan = protection::protection_plan(design);
+  static constexpr auto plan = protection::protection_plan(board_pack);
   static_assert(protection::consistent(plan.rules), "limits of the cell contradict each other");
   return plan;
 }

@@ -1,7 +1,7 @@
 // Settings of the measuring chip for this image: its board and its cell file.
 #include <bit>
 
-#include "firmware/board_design.hpp"
+#include "firmware/board_pack.hpp"
 #include "firmware/front_end/second_line.hpp"
 
 namespace bms {
@@ -10,8 +10,8 @@ namespace {
 
 using namespace firmware;
 
-constexpr protection::Rules rules = protection::rules_of(protection::protection_table(board_design()));
-constexpr hal::bq76952::Board board = front_end_board(board_design(), rules);
+constexpr protection::Rules rules = protection::rules_of(protection::protection_table(board_pack));
+constexpr hal::bq76952::Board board = front_end_board(board_pack, rules);
 constexpr auto board_settings = hal::bq76952::settings(board);
 constexpr SecondLine chip = second_line(board_settings, board.shunt_mohm);
 

@@ -47,11 +47,17 @@ std::vector<StringCell> random_cells(Draw& draw, std::size_t count) {
   return cells;
 }
 
+/// Of the voltage of 16 cells, for which the defaults are.
+double share_of(std::size_t cells) { return static_cast<double>(cells) / 16; }
+
 }  // namespace
 
 TruckParameters typical_world(std::size_t cells) {
   TruckParameters world;
   world.cells.resize(cells);
+  world.dc_link.idle_from_v *= share_of(cells);
+  world.dc_link.lockout_v *= share_of(cells);
+  world.dc_link.recuperation_limit_v *= share_of(cells);
   world.relay[static_cast<std::size_t>(Relay::precharge)] = precharge_relay();
   return world;
 }
@@ -76,10 +82,11 @@ TruckParameters random_world(std::uint64_t seed, const WorldLimits& limits) {
   world.dc_link.capacitance_f = draw.within(world.dc_link.capacitance_f, 0.2);
   world.dc_link.esr_ohm = draw.between(0.005, 0.020);
   if (draw.chance(0.7)) world.dc_link.bleeder_ohm = draw.decades(1e3, 1e5);
-  world.dc_link.idle_w = draw.chance(0.5) ? draw.between(0, 5) : 0;
-  world.dc_link.idle_from_v = draw.between(9, 36);
+  const double share = share_of(limits.cells);  // through the same resistor: the power by its square
+  world.dc_link.idle_w = draw.chance(0.5) ? share * share * draw.between(0, 5) : 0;
+  world.dc_link.idle_from_v = share * draw.between(9, 36);
   world.dc_link.start_v = CellString(world.cells).emf_v() * draw.between(0, 1);
-  world.charger.idle_v = draw.chance(0.3) ? draw.between(20, 60) : 0;
+  world.charger.idle_v = draw.chance(0.3) ? share * draw.between(20, 60) : 0;
   world.front_end.ld_ohm = draw.decades(0.5e6, 5e6);
   world.front_end.pack_ohm = draw.decades(0.5e6, 5e6);
   world.plus_divider = random_divider(draw, limits.divider_tolerance);

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <random>
 #include <string>
 #include <tuple>
@@ -82,7 +83,9 @@ std::map<std::uint32_t, CyclicMessage> hour_with_jitter_of(std::uint32_t jitter_
                                                                   .plan = Board::plan(),
                                                                   .persistence = persistence,
                                                                   .board = board,
-                                                                  .capacity_ah = 6};
+                                                                  .capacity_ah = 6,
+                                                                  .log_samples = false,
+                                                                  .stored_part = std::nullopt};
     telemetry.publish(now);
     j1939.publish(now);
     cia418.publish(now);

@@ -1,13 +1,35 @@
 #include "tests/firmware/elf_image.hpp"
 
+#include <elf.h>
+
 #include <algorithm>
+#include <cstring>
 #include <regex>
 #include <sstream>
 #include <stdexcept>
 
+#include "files/text_file.hpp"
 #include "images/child_process.hpp"
 
 namespace bms::firmware {
+
+std::vector<ProgramPart> program_of(const std::filesystem::path& image) {
+  const std::string all = files::read_file(image);
+  const auto read = [&](auto& into, std::size_t at) {
+    if (at + sizeof into > all.size()) throw std::runtime_error(image.string() + " breaks off");
+    std::memcpy(&into, all.data() + at, sizeof into);
+  };
+  Elf32_Ehdr head{};
+  read(head, 0);
+  std::vector<ProgramPart> parts;
+  for (unsigned k = 0; k < head.e_phnum; ++k) {
+    Elf32_Phdr part{};
+    read(part, head.e_phoff + k * sizeof part);
+    if (part.p_type != PT_LOAD || part.p_filesz == 0) continue;
+    parts.push_back({part.p_paddr, all.substr(part.p_offset, part.p_filesz)});
+  }
+  return parts;
+}
 
 std::vector<Symbol> symbols_of(const std::filesystem::path& image, const std::string& tools) {
   std::vector<Symbol> symbols;

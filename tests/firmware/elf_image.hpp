@@ -1,4 +1,4 @@
-// Symbols and sizes of an image, read with the tools of the cross compiler.
+// Content of an image; symbols and sizes, read with the tools of the cross compiler.
 #pragma once
 
 #include <cstdint>
@@ -13,6 +13,14 @@ struct Symbol {
   char kind = ' ';   ///< as nm prints it: T text, D data, B bss, U undefined ...
   std::string name;  ///< demangled
 };
+
+/// What is programmed into flash from an address on.
+struct ProgramPart {
+  std::uint32_t address = 0;
+  std::string bytes;
+};
+/// Throws std::runtime_error if the file cannot be read.
+std::vector<ProgramPart> program_of(const std::filesystem::path& image);
 
 /// tools: prefix of the tools, "arm-none-eabi-" or "".
 std::vector<Symbol> symbols_of(const std::filesystem::path& image, const std::string& tools = "arm-none-eabi-");

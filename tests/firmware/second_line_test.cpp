@@ -4,9 +4,15 @@
 #include "firmware/front_end/second_line.hpp"
 
 #include <bit>
+#include <cstdio>
+#include <fstream>
+#include <iterator>
+#include <string>
 
 #include <gtest/gtest.h>
 
+#include "firmware/board_design.hpp"
+#include "protection/contactor_plan.hpp"
 #include "tests/cells.hpp"
 
 namespace bms::firmware {
@@ -98,6 +104,24 @@ TEST(SecondLineOfTheFrontEnd, FollowsTheCurrentsOfTheCell) {
   EXPECT_NEAR(of_lfp_200ah.line.high_overcurrent_s, 0.35, 0.002);
 }
 
+/// The table in the README of the driver, which is written by hand.
+TEST(SecondLineOfTheFrontEnd, IsThatOfTheReadme) {
+  std::ifstream file(BMS_SOURCE_DIR "/hal/bq76952/README.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}};
+  const auto has = [&](const char* row, double threshold, double delay) {
+    char text[100];
+    std::snprintf(text, sizeof text, row, threshold, delay);
+    EXPECT_NE(page.find(text), page.npos) << text;
+  };
+  const SecondLine& line = table9.line;
+  has("| COV | DCHG | %.3f V | %.1f s |", line.overvoltage_v, line.overvoltage_s);
+  has("| CUV | DDSG | %.3f V | %.1f s |", line.undervoltage_v, line.undervoltage_s);
+  has("| OCC | DCHG | %.0f A | %.2f s |", line.charge_overcurrent_a, line.charge_overcurrent_s);
+  has("| OCD1 | DDSG | %.0f A | %.2f s |", line.overcurrent_a, line.overcurrent_s);
+  has("| OCD2 | DDSG | %.0f A | %.2f s |", line.high_overcurrent_a, line.high_overcurrent_s);
+  has("| SCD | both | %.0f A | %.2f ms |", line.short_circuit_a, 0.45);
+}
+
 TEST(SecondLineOfTheFrontEnd, AnOvercurrentBeyondTheComparatorIsLeftToTheOthers) {
   model::Limits limits = lfp_200ah;
   limits.charge_current_max_a = limits.discharge_current_max_a = 300;
@@ -119,6 +143,29 @@ TEST(SecondLineOfTheFrontEnd, ABoardWithOtherThresholdsIsNotWiderAndSlower) {
   hal::bq76952::Board fast = table9.board;
   fast.overcurrent_delay_s = 0.2;
   EXPECT_FALSE(overcurrent_is_wider_and_slower(second_line(hal::bq76952::settings(fast), 0.1), table9.rules, period_s));
+}
+
+/// This test is compiled for another truck than the forklift board's: bms_board_of_another_truck in
+/// tests/CMakeLists.txt.
+TEST(BoardDesign, TakesTheTruckFromTheSettingsOfTheBoard) {
+  const protection::PackDesign design = board_design(lfp_200ah, 200);
+  const protection::ContactorPlan plan = protection::contactor_plan(design);
+  EXPECT_EQ(design.cells, 8U);
+  EXPECT_EQ(plan.half_time_constant_us, 500'000U);
+  EXPECT_EQ(plan.max_closing_gap_uv, 8'000'000) << "400 A through 20 mohm";
+  EXPECT_TRUE(possible_truck(design));
+  const protection::Rules rules = protection::rules_of(protection::protection_table(design));
+  EXPECT_DOUBLE_EQ(front_end_board(design, rules).short_circuit_a, 2'000) << "more than main plus makes";
+}
+
+TEST(BoardDesign, RefusesATruckForWhichThePrechargeCannotBeChecked) {
+  const protection::PackDesign design = board_design(lfp_200ah, 200);
+  protection::PackDesign quick = design, slow = design, open = design, far = design;
+  quick.precharge_time_constant_s = 0.1;
+  slow.precharge_time_constant_s = 5;
+  open.closing_current_max_a = 0;
+  far.closing_loop_ohm = 0.04;
+  for (const protection::PackDesign& truck : {quick, slow, open, far}) EXPECT_FALSE(possible_truck(truck));
 }
 
 TEST(SecondLineOfTheFrontEnd, APackOfFewerCellsHasItsInputs) {

@@ -1,6 +1,5 @@
 #include "tests/firmware/unicorn_board.hpp"
 
-#include <elf.h>
 #include <unicorn/unicorn.h>
 
 #include <algorithm>
@@ -10,8 +9,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
-#include "files/text_file.hpp"
 
 namespace bms::firmware {
 
@@ -140,16 +137,9 @@ void UnicornBoard::write_one_time_memory(std::span<const std::uint8_t> bytes) {
 }
 
 void UnicornBoard::load(const std::filesystem::path& image) {
-  const std::string bytes = files::read_file(image);
-  const std::span<const std::uint8_t> all(reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size());
-  Elf32_Ehdr head{};
-  std::memcpy(&head, bytes.data(), sizeof head);
-  for (unsigned k = 0; k < head.e_phnum; ++k) {
-    Elf32_Phdr part{};
-    std::memcpy(&part, bytes.data() + head.e_phoff + k * sizeof part, sizeof part);
-    if (part.p_type != PT_LOAD || part.p_filesz == 0) continue;
-    if (!core_.write(part.p_paddr, all.subspan(part.p_offset, part.p_filesz)))
-      throw std::runtime_error(fmt::format("{}: no memory at {:08x}", image.string(), part.p_paddr));
+  for (const ProgramPart& part : program_of(image)) {
+    if (!core_.write(part.address, bytes_of(part.bytes)))
+      throw std::runtime_error(fmt::format("{}: no memory at {:08x}", image.string(), part.address));
   }
 }
 

@@ -119,6 +119,9 @@ class UnicornBoard {
   /// through an address.
   std::vector<std::uint32_t> call(const std::string& function, std::size_t words);
 
+  /// For observers of each run.
+  UnicornCore& core() { return core_; }
+
   BxcanModel can;
   FlashControllerModel flash;
   bool receive_interrupt_held = false;  ///< the CAN receive interrupt waits, as after a long interrupt

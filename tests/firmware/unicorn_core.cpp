@@ -30,7 +30,7 @@ constexpr std::array core_registers{
     UC_ARM_REG_R1,      UC_ARM_REG_R2,      UC_ARM_REG_R3,      UC_ARM_REG_R4,        UC_ARM_REG_R5,    UC_ARM_REG_R6,
     UC_ARM_REG_R7,      UC_ARM_REG_R8,      UC_ARM_REG_R9,      UC_ARM_REG_R10,       UC_ARM_REG_R11,   UC_ARM_REG_R12,
     UC_ARM_REG_SP,      UC_ARM_REG_LR,      UC_ARM_REG_PC,      UC_ARM_REG_XPSR};
-constexpr int double_registers = 16;
+constexpr std::size_t double_registers = 16;
 
 unsigned version() {
   static const unsigned loaded = uc_version(nullptr, nullptr) >> 8;
@@ -77,17 +77,17 @@ void UnicornCore::map(std::uint32_t address, std::uint32_t bytes, Access access)
 }
 
 void UnicornCore::map_registers(std::uint32_t address, std::uint32_t bytes) {
-  registers_.push_back(std::make_unique<Registers>(this, address));
+  peripherals_.push_back(std::make_unique<Peripherals>(this, address));
   const auto reads = +[](uc_engine*, std::uint64_t at, unsigned size, void* of) -> std::uint64_t {
-    const auto* registers = static_cast<Registers*>(of);
-    return registers->core->on_read(registers->address + static_cast<std::uint32_t>(at), size);
+    const auto* peripherals = static_cast<Peripherals*>(of);
+    return peripherals->core->on_read(peripherals->address + static_cast<std::uint32_t>(at), size);
   };
   const auto writes = +[](uc_engine*, std::uint64_t at, unsigned size, std::uint64_t value, void* of) {
-    const auto* registers = static_cast<Registers*>(of);
-    registers->core->on_write(registers->address + static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(value),
-                              size);
+    const auto* peripherals = static_cast<Peripherals*>(of);
+    peripherals->core->on_write(peripherals->address + static_cast<std::uint32_t>(at),
+                                static_cast<std::uint32_t>(value), size);
   };
-  void* of = registers_.back().get();
+  void* of = peripherals_.back().get();
   for (uc_struct* engine : engines_) must(uc_mmio_map(engine, address, bytes, reads, of, writes, of), "registers");
 }
 
@@ -111,8 +111,13 @@ void UnicornCore::find_instructions(const std::vector<Symbol>& symbols) {
       it_blocks_[at + 2] = end;
     }
   }
-  starts_before_.assign(begins.size() + 1, 0);
-  for (std::size_t k = 0; k < begins.size(); ++k) starts_before_[k + 1] = starts_before_[k] + (begins[k] ? 1 : 0);
+  before_.assign(begins.size() + 1, {});
+  for (std::size_t k = 0; k < begins.size(); ++k) {
+    const auto next = it_blocks_.upper_bound(flash + 2 * static_cast<std::uint32_t>(k));
+    const bool conditional = next != it_blocks_.begin() && flash + 2 * k < std::prev(next)->second;
+    before_[k + 1] = {before_[k].instructions + (begins[k] ? 1 : 0),
+                      before_[k].conditional + (begins[k] && conditional ? 1 : 0)};
+  }
 }
 
 void UnicornCore::watch_entry(std::uint32_t address) {
@@ -185,40 +190,50 @@ std::uint32_t UnicornCore::reg(int id) const {
 
 void UnicornCore::set_reg(int id, std::uint32_t value) { must(uc_reg_write(engine(), id, &value), "register"); }
 
+UnicornCore::Registers UnicornCore::registers() const {
+  static_assert(std::tuple_size_v<Registers> == double_registers + core_registers.size());
+  Registers values{};
+  for (std::size_t k = 0; k < double_registers; ++k)
+    must(uc_reg_read(engine(), UC_ARM_REG_D0 + static_cast<int>(k), &values[k]), "register");
+  for (std::size_t k = 0; k < core_registers.size(); ++k) values[double_registers + k] = reg(core_registers[k]);
+  return values;
+}
+
+void UnicornCore::set_registers(const Registers& values) {
+  for (std::size_t k = 0; k < double_registers; ++k)
+    must(uc_reg_write(engine(), UC_ARM_REG_D0 + static_cast<int>(k), &values[k]), "register");
+  for (std::size_t k = 0; k < core_registers.size(); ++k) {
+    const auto value = static_cast<std::uint32_t>(values[double_registers + k]);
+    set_reg(core_registers[k], core_registers[k] == UC_ARM_REG_PC ? value | 1 : value);
+  }
+}
+
 void UnicornCore::use(std::size_t other) {
   if (other == active_) return;
-  uc_struct *from = engine(), *to = engines_[other];
-  for (int k = 0; k < double_registers; ++k) {
-    std::uint64_t value = 0;
-    must(uc_reg_read(from, UC_ARM_REG_D0 + k, &value), "register");
-    must(uc_reg_write(to, UC_ARM_REG_D0 + k, &value), "register");
-  }
-  for (const int id : core_registers) {
-    std::uint32_t value = 0;
-    must(uc_reg_read(from, id, &value), "register");
-    if (id == UC_ARM_REG_PC) value |= 1;
-    must(uc_reg_write(to, id, &value), "register");
-  }
+  const Registers values = registers();
   active_ = other;
+  set_registers(values);
 }
 
 // ---- to run ----
 
-std::uint64_t UnicornCore::instructions_in(std::uint32_t address, std::uint32_t bytes) const {
+std::pair<std::uint32_t, std::uint32_t> UnicornCore::instructions_in(std::uint32_t address, std::uint32_t bytes) const {
   const std::size_t first = (address - flash) / 2, end = first + bytes / 2;
-  if (address < flash || end >= starts_before_.size()) return std::max(1U, bytes / 2);
-  return std::max(1U, starts_before_[end] - starts_before_[first]);
+  if (address < flash || end >= before_.size()) return {std::max(1U, bytes / 2), 0};
+  return {std::max(1U, before_[end].instructions - before_[first].instructions),
+          before_[end].conditional - before_[first].conditional};
 }
 
 /// Unicorn 2.0.1 does not execute the block that begins if it is stopped here.
 void UnicornCore::begin_block(std::uint32_t address, std::uint32_t bytes) {
-  const std::uint64_t more = instructions_in(address, bytes);
+  const auto [more, conditional] = instructions_in(address, bytes);
   if (executed_ + more > limit_) {
     stopped_ = true;
     uc_emu_stop(engine());
     return;
   }
   executed_ += more;
+  conditional_ += conditional;
   if (address == entry_) on_entry();
 }
 
@@ -229,13 +244,17 @@ void UnicornCore::stop() {
 
 UnicornCore::Run UnicornCore::run_blocks(std::uint32_t from, std::uint64_t limit) {
   use(by_blocks);
-  executed_ = 0;
+  executed_ = conditional_ = 0;
   limit_ = limit;
   stopped_ = false;
+  if (before_blocks) before_blocks();
   running_ = true;
   const uc_err error = uc_emu_start(engine(), from | 1, 0, 0, 0);
   running_ = false;
-  return finish(error, executed_);
+  Run run = finish(error, executed_);
+  run.conditional = conditional_;
+  if (after_blocks) after_blocks(run);
+  return run;
 }
 
 UnicornCore::Run UnicornCore::run_instructions(std::uint32_t from, std::uint64_t count) {
@@ -248,7 +267,7 @@ UnicornCore::Run UnicornCore::run_instructions(std::uint32_t from, std::uint64_t
 }
 
 UnicornCore::Run UnicornCore::finish(int error, std::uint64_t instructions) {
-  Run run{error, reg(UC_ARM_REG_PC), instructions, stopped_};
+  Run run{.error = error, .pc = reg(UC_ARM_REG_PC), .instructions = instructions, .at_limit = stopped_};
   if (error != UC_ERR_OK) return run;
   if (const std::uint32_t behind = behind_it_block(run.pc); behind != run.pc)
     set_reg(UC_ARM_REG_PC, (run.pc = behind) | 1);

@@ -130,7 +130,7 @@ void Cases::start(const std::string& name, const std::function<void(Outcome&)>& 
     _exit(0);
   }
   close(ends[1]);
-  running_.push_back({pid, ends[0], outcomes_.size(), {}});
+  running_.push_back({pid, ends[0], outcomes_.size(), {}, kept.empty() ? kept : file_of(name)});
   outcomes_.emplace_back().name = name;
 }
 
@@ -139,9 +139,9 @@ void Cases::ended(Child& child) {
   waitpid(child.pid, nullptr, 0);
   Outcome& outcome = outcomes_[child.number];
   read_report(child.text, outcome);
-  if (!kept.empty()) {
-    std::filesystem::create_directories(kept);
-    std::ofstream(file_of(outcome.name)) << child.text;
+  if (!child.kept.empty()) {
+    std::filesystem::create_directories(child.kept.parent_path());
+    std::ofstream(child.kept) << child.text;
   }
   if (talks && !outcome.good) fmt::print("FAILED {}: {}\n", outcome.name, outcome.why);
   std::fflush(stdout);

@@ -59,6 +59,7 @@ class Cases {
     int pid, pipe;
     std::size_t number;
     std::string text;
+    std::filesystem::path kept;  ///< file of the outcome; empty: none
   };
   void wait_for(std::size_t most);
   void ended(Child& child);

@@ -96,6 +96,7 @@ void add_temperature_causes(std::vector<Cause>& list) {
                     for (std::size_t k = 0; k < 4; ++k) w.set_thermistor_ohm(k, Bq76952Inputs::open_ohm);
                   },
                   0.4, false, fault(23)});
+  list.back().no_temperature = true;
 }
 
 }  // namespace

@@ -27,7 +27,8 @@ struct Cause {
   bool blind = false;      ///< the front end does not measure any more
   std::uint64_t also = 0;  ///< faults that may follow from the same cause
   std::function<void(TruckWorld&)> each_second = {};
-  bool needs_current = false;  ///< has no effect while no current flows
+  bool needs_current = false;   ///< has no effect while no current flows
+  bool no_temperature = false;  ///< of any sensor: temperature lost then forbids charging
 };
 std::vector<Cause> other_causes();
 

@@ -140,6 +140,13 @@ class FaultCase {
 
   unsigned bit() const { return case_.cause != nullptr ? case_.cause->bit : case_.row->bit; }
 
+  /// As the table and the invariants below it say.
+  Reaction reaction_of(const Row& row) const {
+    constexpr unsigned temperature_lost = 23;
+    const bool no_charge = row.bit == temperature_lost && case_.cause != nullptr && case_.cause->no_temperature;
+    return no_charge ? Reaction::forbid_charge : row.reaction;
+  }
+
   /// Current in the direction that a fault forbids, while the fault was published.
   bool forbidden_current(Reaction reaction) const {
     if (reaction == Reaction::forbid_charge) return charged_;
@@ -157,8 +164,8 @@ class FaultCase {
     bool no_charge = false, no_discharge = false;
     for (const Row& row : judge_.rows()) {
       if (!world_.vehicle.fault(row.bit)) continue;
-      no_charge = no_charge || row.reaction == Reaction::forbid_charge;
-      no_discharge = no_discharge || row.reaction == Reaction::forbid_discharge;
+      no_charge = no_charge || reaction_of(row) == Reaction::forbid_charge;
+      no_discharge = no_discharge || reaction_of(row) == Reaction::forbid_discharge;
     }
     const double rest_a = 0.1 * pack_.limit_a;
     charged_ = charged_ || (no_charge && a > rest_a);
@@ -178,9 +185,10 @@ class FaultCase {
     for (const Row& row : judge_.rows()) {
       const double raised_ms = world_.vehicle.raised_ms(row.bit, run_ms_);
       if (raised_ms < 0) continue;
-      const bool opens = row.reaction == Reaction::open || row.reaction == Reaction::open_now;
-      must_open = must_open || ((opens || forbidden_for_long(row.reaction)) && row.bit == bit() && !silent());
-      if (!opens && !forbidden_current(row.reaction)) continue;
+      const Reaction reaction = reaction_of(row);
+      const bool opens = reaction == Reaction::open || reaction == Reaction::open_now;
+      must_open = must_open || ((opens || forbidden_for_long(reaction)) && row.bit == bit() && !silent());
+      if (!opens && !forbidden_current(reaction)) continue;
       const double ms = row.bit == 32 ? run_ms_ : raised_ms + 1e3 * (opens ? 0 : grace_s) - 1e3 * chain_s;
       if (ms > earliest_ms || (ms == earliest_ms && row.bit != bit())) continue;
       earliest_ms = ms;

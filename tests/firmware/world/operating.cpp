@@ -36,16 +36,17 @@ files::CellFile scaled(double capacity_ah) {
 
 }  // namespace
 
-Pack pack_of(double capacity_ah) {
+Pack pack_of(double capacity_ah, std::size_t cells) {
   const files::CellFile cell = capacity_ah == 6 ? files::read_cell("table9") : scaled(capacity_ah);
-  return {capacity_ah, cell.parameters.limits.discharge_current_max_a,
-          images::firmware_image("stm32f405_forklift", cell, images::Image::application)};
+  return {
+      capacity_ah, cell.parameters.limits.discharge_current_max_a, cells,
+      images::firmware_image("stm32f405_forklift", cell, images::Image::application, "none", cells == 16 ? 0 : cells)};
 }
 
 WorldSetup random_setup(const Pack& pack, std::uint64_t seed) {
   WorldSetup setup;
   setup.seed = static_cast<std::uint32_t>(seed);
-  setup.truck = plant::random_world(seed, {.cells = 16, .divider_tolerance = 0.001});
+  setup.truck = plant::random_world(seed, {.cells = pack.cells, .divider_tolerance = 0.001});
   plant::Random random(seed + 1'000'000);
   const auto between = [&](double least, double most) { return least + random.uniform() * (most - least); };
   const double link_share = setup.truck.dc_link.start_v / plant::CellString(setup.truck.cells).emf_v();
@@ -68,6 +69,7 @@ WorldSetup random_setup(const Pack& pack, std::uint64_t seed) {
 WorldSetup typical_setup(const Pack& pack, std::uint64_t seed) {
   WorldSetup setup;
   setup.seed = static_cast<std::uint32_t>(seed);
+  setup.truck = plant::typical_world(pack.cells);
   setup.truck.seed = seed;
   setup.truck.dc_link.bleeder_ohm = 10e3;
   for (plant::StringCell& cell : setup.truck.cells) cell = {.capacity_ah = pack.capacity_ah, .soc = 0.55};
@@ -84,7 +86,8 @@ void set_drive_a(TruckWorld& world, double current_a) {
 }
 
 void set_charger_a(TruckWorld& world, double current_a) {
-  world.truck.set_charger({.on = current_a > 0, .voltage_v = 58.4, .current_a = current_a});
+  const double voltage_v = 3.65 * static_cast<double>(world.truck.cell_count());
+  world.truck.set_charger({.on = current_a > 0, .voltage_v = voltage_v, .current_a = current_a});
 }
 
 std::string bring_to(TruckWorld& world, const Pack& pack, Operating state) {

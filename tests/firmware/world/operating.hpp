@@ -11,10 +11,11 @@ namespace bms::world {
 /// Cells like table9 of another capacity: currents scale with it, resistances with its inverse.
 struct Pack {
   double capacity_ah = 6, limit_a = 6;
+  std::size_t cells = 16;
   std::filesystem::path image;
 };
 /// Builds the image of the forklift board for this pack, if it is not there yet.
-Pack pack_of(double capacity_ah);
+Pack pack_of(double capacity_ah, std::size_t cells = 16);
 /// Cells of a small forklift, and the cell whose thresholds protection/README.md prints.
 inline constexpr double truck_ah = 100, printed_ah = 6;
 

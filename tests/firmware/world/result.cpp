@@ -4,8 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "files/text_file.hpp"
-
+#include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/world/scenarios.hpp"
 
 namespace bms::world {
@@ -29,9 +28,10 @@ void Extent::set(Cases& cases, const std::string& scenario, const Pack& pack) co
   cases.largest = most;
   cases.most_minutes = within_minutes;
   if (!continues && !only_kept) return;
-  const std::size_t image = std::hash<std::string>{}(files::read_file(pack.image));
-  cases.kept =
-      std::filesystem::path(BMS_SOURCE_DIR "/build/world") / fmt::format("{}_{:016x}_{}", scenario, image, seed);
+  std::string program;
+  for (const firmware::ProgramPart& part : firmware::program_of(pack.image)) program += part.bytes;
+  cases.kept = std::filesystem::path(BMS_SOURCE_DIR "/build/world") /
+               fmt::format("{}_{:016x}_{}", scenario, std::hash<std::string>{}(program), seed);
 }
 
 }  // namespace bms::world

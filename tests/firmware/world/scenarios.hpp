@@ -21,8 +21,9 @@ struct Result {
 struct Extent {
   std::size_t count = 0;  ///< 0: all
   std::uint64_t seed = 1;
-  std::string only;     ///< cases whose name contains one of these texts, separated by |; empty: all
-  double minutes = 10;  ///< of the shift
+  std::string only;        ///< cases whose name contains one of these texts, separated by |; empty: all
+  double minutes = 10;     ///< of the shift
+  std::size_t cells = 16;  ///< in series, for the starts
   unsigned at_once = 2;
   bool continues = false;     ///< good outcomes of an earlier run with the same image and seed count
   bool only_kept = false;     ///< runs nothing: the table of the outcomes that are known

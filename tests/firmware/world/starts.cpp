@@ -99,7 +99,7 @@ class Start {
 }  // namespace
 
 Result run_starts(const Extent& extent) {
-  const Pack pack = pack_of(truck_ah);
+  const Pack pack = pack_of(truck_ah, extent.cells);
   Cases cases(extent.at_once);
   extent.set(cases, "starts", pack);
   const std::size_t count = extent.count == 0 ? 50 : extent.count;
@@ -107,7 +107,8 @@ Result run_starts(const Extent& extent) {
     const std::uint64_t seed = extent.seed + k;
     cases.start(fmt::format("world {}", seed), [&, seed](Outcome& outcome) { Start(pack, seed, outcome).run(); });
   }
-  Result result{"starts", "", cases.finish()};
+  const bool usual = extent.cells == Extent{}.cells;
+  Result result{usual ? "starts" : fmt::format("starts of {} cells", extent.cells), "", cases.finish()};
   result.table = "| what | worlds | soonest [s] | latest [s] |\n|---|---|---|---|\n";
   for (const char* what : {"key on", "charge", "restart", "restart at once"}) {
     std::vector<double> s;

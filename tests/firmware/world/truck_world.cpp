@@ -239,11 +239,13 @@ void TruckWorld::update_chip() {
   const plant::PinVoltages v = truck.pins();
   Bq76952Inputs in;
   in.stack_v = sensors.stack_error_v;
-  for (std::size_t k = 0; k < 16; ++k) {
+  const std::size_t cells = truck.cell_count();
+  for (std::size_t k = 0; k < cells; ++k) {
     const double cell_v = truck.cell_v(k);
+    double& input_v = in.cell_v[k + 1 < cells ? k : in.cell_v.size() - 1];  // hal/bq76952/README.md, wiring
     in.stack_v += cell_v;
-    in.cell_v[k] = cell_v + sensors.cell_error_v[k];
-    if (setup_.cell_noise_v > 0) in.cell_v[k] += setup_.cell_noise_v * noise_.normal();
+    input_v = cell_v + sensors.cell_error_v[k];
+    if (setup_.cell_noise_v > 0) input_v += setup_.cell_noise_v * noise_.normal();
   }
   in.pack_v = v.pack_v;
   in.ld_v = v.ld_v;
@@ -279,7 +281,7 @@ void TruckWorld::hold_cell(std::size_t cell, double voltage_v) {
 
 /// Newton steps on the charge of a cell. Beyond 0 and 100 % the curve goes on with its last slope.
 void TruckWorld::update_held_cells() {
-  for (std::size_t k = 0; k < held_v_.size(); ++k) {
+  for (std::size_t k = 0; k < truck.cell_count(); ++k) {
     if (std::isnan(held_v_[k])) continue;
     for (int step = 0; step < 40; ++step) {
       const double error_v = held_v_[k] - truck.cell_v(k);
@@ -309,19 +311,19 @@ bool TruckWorld::isolated() const {
 
 double TruckWorld::highest_cell_v() const {
   double v = 0;
-  for (std::size_t k = 0; k < 16; ++k) v = std::max(v, truck.cell_v(k));
+  for (std::size_t k = 0; k < truck.cell_count(); ++k) v = std::max(v, truck.cell_v(k));
   return v;
 }
 
 double TruckWorld::lowest_cell_v() const {
   double v = 10;
-  for (std::size_t k = 0; k < 16; ++k) v = std::min(v, truck.cell_v(k));
+  for (std::size_t k = 0; k < truck.cell_count(); ++k) v = std::min(v, truck.cell_v(k));
   return v;
 }
 
 double TruckWorld::pack_v() const {
   double v = 0;
-  for (std::size_t k = 0; k < 16; ++k) v += truck.cell_v(k);
+  for (std::size_t k = 0; k < truck.cell_count(); ++k) v += truck.cell_v(k);
   return v;
 }
 

@@ -5,6 +5,7 @@
 //   --seed N         of the random worlds
 //   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
 //   --minutes N      duration of the shift
+//   --cells N        in series, for the starts: another number than 16
 //   --jobs N         cases at a time
 //   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed
 //   --from N         leaves the first N cases to other parts
@@ -70,12 +71,16 @@ Options read_options(const std::vector<std::string>& words) {
       options.extent.only = value();
     } else if (words[k] == "--minutes") {
       options.extent.minutes = std::stod(value());
+    } else if (words[k] == "--cells") {
+      options.extent.cells = std::stoul(value());
     } else if (words[k] == "--jobs") {
       options.extent.at_once = static_cast<unsigned>(std::stoul(value()));
     } else {
       options.scenario = words[k];
     }
   }
+  if (options.extent.cells != Extent{}.cells && options.scenario != "starts")
+    throw std::invalid_argument("--cells is for the starts");
   return options;
 }
 

@@ -42,6 +42,54 @@ TEST(World, ProtectionsActOnPhysicalCauses) {
 
 TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.only = "", .minutes = 3, .at_once = 2})); }
 
+/// Between deep discharge (1.5 V) and cell undervoltage severe (1.8 V): C/20 after a clear command.
+TEST(World, ACellBelow1800mVIsChargedWithATwentiethOfTheCapacityOnly) {
+  TruckWorld world(pack().image, typical_setup(pack()));
+  for (std::size_t k = 0; k < 16; ++k) world.hold_cell(k, 1.65);
+  world.run_ms(5'000);
+  EXPECT_EQ(world.vehicle.first_cause(), 6U) << "cell undervoltage severe";
+  world.vehicle.request = Request::drive;
+  world.vehicle.clear_faults();
+  EXPECT_LT(world.run_until([&] { return world.any_main_closed(); }, 10'000), 0) << "drives";
+  world.vehicle.request = Request::none;
+  world.run_ms(1'000);
+  world.vehicle.clear_faults();
+  world.run_ms(500);
+  world.vehicle.request = Request::charge;
+  const auto charges = [&] { return world.both_mains_closed() && world.closed(Relay::charge); };
+  ASSERT_GE(world.run_until(charges, start_limit_ms), 0) << summary(world);
+  world.run_ms(6'000);
+  EXPECT_NEAR(world.vehicle.allowed_charge_a(), pack().capacity_ah / 20, 0.02);
+  set_charger_a(world, 0.8 * pack().capacity_ah / 20);
+  world.run_ms(10'000);
+  EXPECT_TRUE(charges()) << summary(world);
+  set_charger_a(world, 1.2 * pack().capacity_ah / 10);
+  EXPECT_GE(world.run_until([&] { return world.isolated(); }, 1e3 * (chain_s + contactor_s)), 0);
+}
+
+/// The flashed image for a truck of 24 V, and one with an odd number of cells.
+class PackSize : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(PackSize, DrivesChargesAndOpensForItsHighestCell) {
+  const Pack small = pack_of(6, GetParam());
+  TruckWorld world(small.image, typical_setup(small));
+  for (const Operating state : {Operating::drive, Operating::charge, Operating::recuperate}) {
+    EXPECT_EQ(bring_to(world, small, state), "");
+    EXPECT_EQ(fault_names(world.vehicle.faults_seen()), "none") << name_of(state);
+    if (state == Operating::recuperate) break;
+    EXPECT_GE(key_off(world), 0) << name_of(state);
+  }
+  const double begun_ms = world.now_ms();
+  world.hold_cell(GetParam() - 1, 3.9);
+  EXPECT_GE(world.run_until([&] { return world.isolated(); }, 1e3 * (0.2 + chain_s + contactor_s)), 0);
+  EXPECT_GT(world.opened_ms() - begun_ms, 200) << "the delay of the row";
+  world.run_ms(300);
+  EXPECT_EQ(world.vehicle.first_cause(), 3U) << "cell overvoltage severe";
+  EXPECT_THAT(world.closings_below_v(closing_limit_v), IsEmpty());
+  EXPECT_THAT(world.violations(), IsEmpty());
+}
+INSTANTIATE_TEST_SUITE_P(Cells, PackSize, ::testing::Values(8, 15));
+
 /// The promise is read from the page as it is printed.
 TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
   const auto rows = promised_rows(BMS_SOURCE_DIR "/protection/README.md");
