@@ -8,6 +8,7 @@
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -15,6 +16,7 @@
 #include "files/bad_input.hpp"
 #include "tool/commands.hpp"
 #include "tool/output.hpp"
+#include "tool/progress.hpp"
 
 namespace {
 
@@ -24,8 +26,8 @@ using namespace bms::tool;
 std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> commands;
   for (const auto make : {import_command, replay_command, simulate_command, experiment_command, identify_command,
-                          cell_command, diagnose_command, fleet_command, study_command, proof_command, hil_command,
-                          flash_command, monitor_command, log_command, service_command})
+                          cell_command, diagnose_command, ammeter_command, fleet_command, study_command, proof_command,
+                          hil_command, flash_command, monitor_command, log_command, service_command})
     commands.push_back(make());
   return commands;
 }
@@ -59,7 +61,13 @@ int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entrie
   }
   for (const auto& [entry, command] : entries) {
     if (!entry->parsed()) continue;
+    const std::string name = entry->get_name();
+    // these are live, or a dialogue with a battery
+    const bool live = name == "monitor" || name == "log" || name == "service";
+    std::optional<Heartbeat> heartbeat;
+    if (!live) heartbeat.emplace(name);
     const int code = command->run();
+    heartbeat.reset();
     check_standard_output();
     return code;
   }
