@@ -19,7 +19,7 @@ namespace {
 constexpr std::array<std::string_view, 3> of_the_image = {"Board.StackFree", "Board.LongestSample",
                                                           "LastFaultAddress.ProgramCounter"};
 constexpr std::array<std::string_view, 1> messages_of_the_image = {"Identity"};
-constexpr double current_margin_a = 0.05, current_margin = 0.01;  ///< rounding of the message; as the truck's control
+constexpr double current_margin_a = 0.03, current_margin = 0.002;  ///< rounding of the messages
 
 bool equal(double a, double b) { return a == b || (std::isnan(a) && std::isnan(b)); }
 

@@ -92,6 +92,17 @@ hil::SessionPlan plan_of(const AgainstOptions& options) {
   return plan;
 }
 
+/// A comparison of two batteries that are switched off would find no difference.
+void refuse_open_contactors(const AgainstOptions& options, const hil::SessionResult& before) {
+  if (before.driving_after_s) return;
+  std::string faults;
+  for (const hil::FaultEvent& f : before.faults) faults += (faults.empty() ? "" : ", ") + f.name;
+  throw files::BadInput(options.recording, 1,
+                        fmt::format("the present firmware does not close its contactors on this log{}, so nothing can "
+                                    "be compared; expected the board's own --sample-s and a log of its cells",
+                                    faults.empty() ? "" : " (" + faults + ")"));
+}
+
 Firmwares compute(const AgainstOptions& options, const hil::SessionPlan& plan) {
   const files::CellFile new_cell = options.new_cell.empty() ? plan.cell : files::read_cell(options.new_cell);
   Firmwares f;
@@ -108,6 +119,7 @@ Firmwares compute(const AgainstOptions& options, const hil::SessionPlan& plan) {
     if (show) show(done, "");
   });
   f.before = first.get();
+  refuse_open_contactors(options, f.before.session);
   f.comparison = hil::compare(f.before, f.after);
   return f;
 }
@@ -155,16 +167,27 @@ std::string consequences(const Firmwares& f) {
   return text;
 }
 
+/// What the comparison does not cover.
+std::string uncovered(const Firmwares& f) {
+  const auto& cut_off_at_s = f.before.session.cut_off_at_s;
+  if (!cut_off_at_s) return "";
+  return fmt::format(
+      " The present firmware opens its contactors at {} under the load of the log: what follows is the "
+      "comparison of a battery without current.",
+      clock(*cut_off_at_s));
+}
+
 std::string statement_of(const Firmwares& f) {
   const hil::FirmwareComparison& c = f.comparison;
   if (c.differences == 0)
     return fmt::format("No difference: {} and {} publish the same values at all {} samples of {}.", f.before_name,
-                       f.after_name, c.samples, clock(f.before.session.duration_s));
+                       f.after_name, c.samples, clock(f.before.session.duration_s)) +
+           uncovered(f);
   std::string text = fmt::format(
       "With {} instead of {} the battery would behave differently on this log, first at {} "
       "({}).",
       f.after_name, f.before_name, clock(c.first->time_s), c.first->what);
-  return text + consequences(f);
+  return text + consequences(f) + uncovered(f);
 }
 
 Json fault_json(const std::optional<hil::FaultEvent>& f) {

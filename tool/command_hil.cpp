@@ -232,8 +232,8 @@ class HilCommand final : public Command {
         "sense_wire=K cell_high=K cell_low=K (cell K),\n"
         "current_stuck current_open temperature_open temperature_stuck overcurrent welded precharge_open silence; each "
         "@START or @START-END in seconds\n"
-        "Example: bms hil --board netduinoplus2 --cell table9 --profile shift.csv --fault cell_open=3@600-660 --report "
-        "loop.html");
+        "Example: bms hil --board stm32f405_forklift --cell table9 --profile shift.csv --fault cell_open=3@600-660 "
+        "--report loop.html");
     c.add_option("--board", o_.board, "folder in boards/; it is emulated unless --port names a real one")
         ->capture_default_str();
     c.add_option("--port", o_.port, "serial port of a board that speaks SLCAN")->type_name("DEVICE");

@@ -28,6 +28,7 @@ struct SimulateOptions {
   std::string recording, profile;  ///< one of the two
   std::vector<std::string> with;   ///< "ID:param=value,...": mechanisms to add, or to use instead of the cell's own
   double initial_soc = 0.5;
+  CLI::Option* initial_soc_given = nullptr;
   double noise_v = 0, noise_a = 0;  ///< standard deviations
   unsigned long seed = 1;
   std::string out;
@@ -228,9 +229,9 @@ class SimulateCommand final : public Command {
     c.add_option("--profile", o_.profile, "current profile: a recording without voltage_v")
         ->type_name("FILE")
         ->excludes(recording);
-    c.add_option("--initial-soc", o_.initial_soc, "state of charge at the start, 0..1")
-        ->check(Within(0.0, 1.0))
-        ->capture_default_str();
+    o_.initial_soc_given = c.add_option("--initial-soc", o_.initial_soc,
+                                        "state of charge at the start, 0..1; if not given soc_ref, or else 0.5")
+                               ->check(Within(0.0, 1.0));
     c.add_option("--with", o_.with,
                  "mechanism to add, or to use instead of the cell's own, for example "
                  "ocv_hysteresis:half_gap_v=0.01,decay=40; may be repeated")
@@ -255,6 +256,9 @@ class SimulateCommand final : public Command {
     o_.output.set_own(o_.out);
     o_.output.protect({o_.cell, o_.input()});
     SimulationRun run = read(o_);
+    const measurement::Column& known = run.recording.soc_ref;
+    if (o_.initial_soc_given->count() == 0 && !known.empty() && known.front() >= 0 && known.front() <= 1)
+      o_.initial_soc = known.front();
     compute(o_, run);
     write(o_, run);
     return 0;

@@ -4,11 +4,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <exception>
 #include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -43,6 +45,38 @@ int refuse(const CLI::App& app, const CLI::ParseError& error) {
   return 2;
 }
 
+/// Changes of letters that make one word of the other.
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t k = 0; k < row.size(); ++k) row[k] = k;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t before = row[0]++;
+    for (std::size_t k = 1; k <= b.size(); ++k) {
+      const std::size_t changed = before + (a[i - 1] == b[k - 1] ? 0 : 1);
+      before = row[k];
+      row[k] = std::min({changed, row[k] + 1, row[k - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// Why a first word that is no command was not understood; empty if it is one, or an option.
+std::string unknown_command(const std::vector<std::pair<CLI::App*, Command*>>& entries, const std::string& word) {
+  if (word.empty() || word.front() == '-') return "";
+  std::string nearest;
+  std::size_t changes = 3;  // more would be another word
+  for (const auto& [entry, command] : entries) {
+    const std::string name = entry->get_name();
+    if (name == word) return "";
+    if (const std::size_t by = distance(word, name); by < changes) {
+      changes = by;
+      nearest = name;
+    }
+  }
+  return "no such command '" + bms::files::printable(word) + "', expected one of those of bms --help" +
+         (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+}
+
 /// A file that is opened must not become a closed standard output, or results would be mixed. A closed pipe is an error
 /// like a full disk, not the end of the process.
 void prepare_standard_streams() {
@@ -54,6 +88,16 @@ void prepare_standard_streams() {
 }
 
 int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entries, int argc, char** argv) {
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first == "help" || first == "version") {
+    std::fputs(first == "help" ? app.help().c_str() : BMS_VERSION "\n", stdout);
+    check_standard_output();
+    return 0;
+  }
+  if (const std::string why = unknown_command(entries, first); !why.empty()) {
+    std::fprintf(stderr, "bms: %s\n", why.c_str());
+    return 2;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

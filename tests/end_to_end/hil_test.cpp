@@ -178,6 +178,12 @@ TEST_F(Hil, ALimitFivePercentLowerIsShownForWhatItDoesToALog) {
   EXPECT_NEAR(j["above_allowed_s"]["after"], 60, 10) << "5.8 A of 5.7 A";
 }
 
+TEST_F(Hil, TwoBatteriesThatStaySwitchedOffAreNotCalledEqual) {
+  const auto r = run_tool("replay " + short_log(folder_.path()) + " --against " BMS_SOURCE_DIR " --sample-s 5");
+  EXPECT_EQ(r.exit_code, 2) << r.out;
+  EXPECT_THAT(r.err, HasSubstr("does not close its contactors"));
+}
+
 TEST_F(Hil, AnImageForTheChipOrAnUnknownCommitIsRefused) {
   const std::string log = short_log(folder_.path());
   const auto commit = run_tool("replay " + log + " --against no_such_commit");
