@@ -60,7 +60,7 @@ std::size_t distance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
-/// Why a first word that is no command was not understood; empty if it is one, or an option.
+/// Why the first word was not understood; empty if it is a command or an option.
 std::string unknown_command(const std::vector<std::pair<CLI::App*, Command*>>& entries, const std::string& word) {
   if (word.empty() || word.front() == '-') return "";
   std::string nearest;
