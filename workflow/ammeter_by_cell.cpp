@@ -28,11 +28,12 @@ constexpr double shortest_block_s = 10;
 /// Standard deviations before the log: nothing is known of the initial state of charge; the offset is below 10 % of 1C;
 /// gain and capacity are good to 5 %; resistances change by half over a life.
 constexpr double soc_prior = 0.5, offset_prior_c = 0.1, gain_prior = 0.05, resistance_prior = 0.5;
-constexpr double relaxation_s = 3'600, ocv_correlation_soc = 0.05;
+constexpr double relaxation_s = 3'600, ocv_correlation_soc = 0.05, plateau_soc = 0.3;
 constexpr int most_iterations = 25;
 constexpr std::size_t most_starts = 6;
 constexpr double worst_chi2 = 4;       ///< per degree of freedom: beyond it the cell file does not describe the log
 constexpr double worst_rms = 2;        ///< times what the noise model expects: the same for slow errors
+constexpr double worst_gain = 0.1;     ///< beyond it the cell file has another capacity
 constexpr double same_cost = 6;        ///< two starts whose costs differ by less explain the log equally well
 constexpr double visible_share = 0.2;  ///< of the prior: an offset that is less certain is not visible
 
@@ -72,7 +73,9 @@ class Fit {
     double cost = std::numeric_limits<double>::infinity();
   };
 
-  Result from(const Values& start) {
+  /// exact: the gain stays at 0.
+  Result from(const Values& start, bool exact = false) {
+    exact_gain_ = exact;
     Result best;
     best.values = start;
     weigh(best.values);
@@ -198,27 +201,42 @@ class Fit {
     information.diagonal() += prior_.cwiseInverse().cwiseAbs2();
     Values known = v.cwiseQuotient(prior_.cwiseAbs2());
     known[initial_soc] = 0;
-    return -information.ldlt().solve(Values(j.transpose() * e + known));
+    Values gradient = j.transpose() * e + known;
+    if (exact_gain_) {
+      information.row(gain).setZero();
+      information.col(gain).setZero();
+      information(gain, gain) = 1;
+      gradient[gain] = 0;
+    }
+    return -information.ldlt().solve(gradient);
   }
 
-  /// The noise of the blocks: what the cell file states about its own errors.
+  /// What the cell file states about its own errors: of the OCV over a few per cent of the state of charge, and of the
+  /// voltage at rest over an hour, over a plateau, and over the whole log (a sensor of the voltage, an entropy).
+  double covariance_of(const Block& a, const Block& b, const std::vector<host_sim::SimulatedRow>& rows) const {
+    const model::Noise& n = file_.parameters.noise;
+    const model::Tolerance& t = file_.parameters.tolerance;
+    const double apart_s = std::abs(a.time_s - b.time_s), apart_soc = rows[a.begin].soc - rows[b.begin].soc;
+    const auto along = [&](double correlated_soc) {
+      return std::exp(-0.5 * apart_soc * apart_soc / (correlated_soc * correlated_soc));
+    };
+    const double model_s = std::max(1.0, n.model_correlation_s * model::persistent_error_correlations);
+    return t.ocv_v * t.ocv_v * along(ocv_correlation_soc) +
+           n.rest_v * n.rest_v * (std::exp(-apart_s / relaxation_s) + along(plateau_soc) + 1) +
+           n.model_v * n.model_v * std::exp(-apart_s / model_s);
+  }
+
+  /// The noise of the blocks.
   void weigh(const Values& v) {
     const auto rows = simulated(v);
     const model::Noise& n = file_.parameters.noise;
-    const model::Tolerance& t = file_.parameters.tolerance;
     const auto count = static_cast<Eigen::Index>(blocks_.size());
     Matrix c(count, count);
     for (Eigen::Index a = 0; a < count; ++a) {
       const Block& block = blocks_[static_cast<std::size_t>(a)];
       for (Eigen::Index b = 0; b <= a; ++b) {
         const Block& other = blocks_[static_cast<std::size_t>(b)];
-        const double apart_s = std::abs(block.time_s - other.time_s),
-                     apart_soc = (rows[block.begin].soc - rows[other.begin].soc) / ocv_correlation_soc;
-        c(a, b) = c(b, a) =
-            t.ocv_v * t.ocv_v * std::exp(-0.5 * apart_soc * apart_soc) +
-            n.rest_v * n.rest_v * std::exp(-apart_s / relaxation_s) +
-            n.model_v * n.model_v *
-                std::exp(-apart_s / std::max(1.0, n.model_correlation_s * model::persistent_error_correlations));
+        c(a, b) = c(b, a) = covariance_of(block, other, rows);
       }
       c(a, a) += n.voltage_v * n.voltage_v / static_cast<double>(block.readings) + 1e-10;
     }
@@ -232,6 +250,7 @@ class Fit {
   Values prior_, step_;
   Eigen::LLT<Matrix> factor_;
   double expected_rms_ = 0;
+  bool exact_gain_ = false;
 };
 
 std::string amperes(double a) {
@@ -301,7 +320,11 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   found.r0_times = 1 + best[r0];
   found.gain_and_capacity = {best[gain], std_of(gain)};
   found.gain_visible = std_of(gain) < 0.5 * gain_prior;
-  const Uncertain offset_a{best[offset], std_of(offset)};
+  // a gain that is off by more than assumed takes the offset with it
+  Values without_gain = best;
+  without_gain[gain] = 0;
+  const double moved_a = fit.from(without_gain, true).values[offset] - best[offset];
+  const Uncertain offset_a{best[offset], std::hypot(std_of(offset), moved_a)};
   const auto other = std::find_if(results.begin(), results.end(), [&](const Fit::Result& r) {
     return r.cost < results.front().cost + same_cost && std::abs(r.values[offset] - best[offset]) > 3 * offset_a.std;
   });
@@ -310,6 +333,11 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
         "the cell file does not describe this log, it is off by {:.1f} mV RMS; "
         "bms diagnose finds why",
         1e3 * found.residual_v);
+  else if (std::abs(best[gain]) > worst_gain || std::max(best[r0], best[r1]) > 1 || std::min(best[r0], best[r1]) < -0.5)
+    found.offset_a.why = fmt::format(
+        "the cell file does not describe this log: it would need a charge balance that is off by {:+.0f} %, and {:.1f} "
+        "and {:.1f} times the R0 and R1; bms diagnose finds why",
+        100 * best[gain], 1 + best[r0], 1 + best[r1]);
   else if (other != results.end())
     found.offset_a.why = fmt::format(
         "offsets of {} and {} explain the log equally well; a log with a rest near full or near empty would "

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <sstream>
@@ -230,7 +231,8 @@ TEST_F(ImportFiles, WithoutTheOptionItIsAnErrorAndWithConfirmationItIsRead) {
 TEST_F(ImportFiles, APackIsSimulatedAndIdentifiedCellByCell) {
   std::string profile = "time_s,current_a\n";
   for (int k = 0; k <= 7'200; ++k) {
-    const double drive_a = k / 60 % 3 == 0 ? -5.5 : (k / 60 % 3 == 1 ? 2.0 : -1.0);
+    constexpr std::array<double, 3> drive = {-5.5, 2.0, -1.0};
+    const double drive_a = drive[static_cast<std::size_t>(k) / 60 % 3];
     profile += std::to_string(k) + "," + std::to_string(k < 900 ? 0.0 : drive_a) + "\n";
   }
   write("p.csv", profile);
