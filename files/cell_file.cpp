@@ -233,8 +233,8 @@ void reject_if_fpu_needed(const CellFile& file) {
   }
   if (!model::fits_fixed_point(file.parameters, acting))
     throw BadInput(file.path, 1,
-                   "the mechanisms make a resistance too large or too small for fixed point, expected arithmetic in "
-                   "float");
+                   "rc.c1_f is above 100000 F, or the mechanisms make a resistance too large or too small for fixed "
+                   "point, expected arithmetic in float");
 }
 
 namespace {

@@ -25,7 +25,9 @@ struct PageChart {
   std::string title;
   std::vector<std::string> labels;  ///< one for each column
   std::vector<double> time_s;
-  std::vector<std::vector<double>> columns;  ///< NaN: no value
+  std::vector<std::vector<double>> columns;         ///< NaN: no value
+  std::vector<std::vector<double>> half_band = {};  ///< empty, or for each column half the width of a band; empty: none
+  std::string x_title = {};                         ///< what time_s has instead of the time; empty: the time
 };
 
 struct PageContent {

@@ -28,6 +28,11 @@ class LoadProfile {
   }
   /// Interpolated linearly between the rows.
   double voltage_v(double time_s) const { return interpolated(recording_.voltage_v, time_s); }
+  /// Of one cell, from 0: its own column if the recording has one, else the column of the mean.
+  double cell_voltage_v(std::size_t cell, double time_s) const {
+    const auto& cells = recording_.cell_voltage_v;
+    return interpolated(cell < cells.size() ? cells[cell] : recording_.voltage_v, time_s);
+  }
   /// Interpolated linearly between the rows; NaN without a column soc_ref.
   double soc_ref(double time_s) const {
     return recording_.soc_ref.empty() ? std::nan("") : interpolated(recording_.soc_ref, time_s);

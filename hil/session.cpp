@@ -27,6 +27,8 @@ constexpr double shutdown_s = 20, reclose_request_s = 12;
 
 std::int32_t micro(double value) { return static_cast<std::int32_t>(std::lround(1e6 * value)); }
 
+std::int32_t reading_of(double value) { return std::isfinite(value) ? micro(value) : measurement::no_reading; }
+
 can::Frame request(protection::Request what, std::uint8_t counter) {
   can::Command command;
   command.code = can::Command::code_request;
@@ -208,15 +210,20 @@ class Session {
 
   /// The recording instead of the simulated pack; the sensors have no noise of their own.
   void replace_by_recording(const Step& step, Measured& measured) {
-    const std::int32_t cell_uv = micro(profile_.voltage_v(profile_s_));
     const double recorded_a = step.profile_runs ? profile_.current_a() : 0;
     const bool conducts = step.contactors.conducts(step.welded);
     if (!conducts && std::abs(recorded_a) > rest_c_rate * plan_.cell.parameters.capacity_ah && !result_.cut_off_at_s)
       result_.cut_off_at_s = step.time_s;
     auto& sample = measured.sample;
     sample.current_ua = conducts ? micro(recorded_a) : 0;
-    for (std::size_t c = 0; c < plan_.cells; ++c) sample.cell_uv[c] = cell_uv;
-    sample.pack_uv = static_cast<std::int32_t>(plan_.cells) * cell_uv;
+    const std::int32_t mean_uv = reading_of(profile_.voltage_v(profile_s_));
+    if (mean_uv != measurement::no_reading) replayed_pack_uv_ = 0;  // of a missing cell: the mean
+    for (std::size_t c = 0; c < plan_.cells; ++c) {
+      sample.cell_uv[c] = reading_of(profile_.cell_voltage_v(c, profile_s_));
+      if (mean_uv == measurement::no_reading) continue;
+      replayed_pack_uv_ += sample.cell_uv[c] == measurement::no_reading ? mean_uv : sample.cell_uv[c];
+    }
+    sample.pack_uv = replayed_pack_uv_;
     measured.soc_true = result_.cut_off_at_s ? std::nan("") : profile_.soc_ref(profile_s_);
     replayed_dc_link_v_ = dc_link_voltage_after(replayed_dc_link_v_, 1e-6 * sample.pack_uv, step.contactors,
                                                 step.welded, plan_.sample_period_s);
@@ -269,7 +276,9 @@ class Session {
                              .current_a = 1e-6 * measured.sample.current_ua,
                              .lowest_v = lowest_v,
                              .highest_v = highest_v,
-                             .dc_link_v = measured.dc_link_v});
+                             .dc_link_v = measured.dc_link_v,
+                             .allowed_charge_a = static_cast<double>(received_.allowed.charge),
+                             .allowed_discharge_a = static_cast<double>(received_.allowed.discharge)});
     const double end_s = profile_.duration_s();
     if (progress_) progress_(end_s > 0 ? std::min(1.0, profile_s_ / end_s) : 1);
   }
@@ -294,6 +303,7 @@ class Session {
   SocErrors soc_errors_;
   SessionResult result_;
   double profile_s_ = 0, replayed_dc_link_v_ = 0;
+  std::int32_t replayed_pack_uv_ = 0;
   std::uint8_t request_counter_ = 0;
   std::uint64_t challenge_ = 0;
   std::uint16_t freshness_ = 0;

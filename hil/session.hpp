@@ -22,7 +22,8 @@ namespace bms::hil {
 
 struct SessionPlan {
   files::CellFile cell;            ///< of the simulated pack
-  measurement::Recording profile;  ///< its current is the load; if replayed, its voltages are the cell voltages
+  measurement::Recording profile;  ///< its current is the load; if replayed, its voltages are the cell voltages,
+                                   ///< those of v_1 to v_N if it has them for all cells
   bool replayed = false;     ///< the cells read the recording; its current flows only while the contactors are closed
   std::size_t cells = 16;    ///< 1 to max_cells, as the board has
   double initial_soc = 0.9;  ///< of the pack
@@ -42,6 +43,7 @@ struct InjectionResult {
 
 struct TracePoint {
   double time_s, soc, soc_sigma, soc_true, current_a, lowest_v, highest_v, dc_link_v;
+  double allowed_charge_a = 0, allowed_discharge_a = 0;  ///< NaN: not published
 };
 
 struct SessionResult {

@@ -20,46 +20,15 @@ namespace bms::images {
 
 namespace {
 
-/// Where the tool is installed; empty if it runs from its build folder.
-std::filesystem::path installed() {
-  std::error_code failed;
-  const auto prefix = std::filesystem::read_symlink("/proc/self/exe", failed).parent_path().parent_path();
-  return !failed && std::filesystem::exists(prefix / "share/greybox/source/CMakeLists.txt") ? prefix
-                                                                                            : std::filesystem::path();
-}
-
-/// The source tree: BMS_ROOT, or what is installed with the tool, or the folder from which the tool was built.
-std::filesystem::path source_tree() {
-  if (const char* root = std::getenv("BMS_ROOT"); root != nullptr) return root;
-  const auto prefix = installed();
-  return prefix.empty() ? std::filesystem::path(BMS_SOURCE_DIR) : prefix / "share/greybox/source";
-}
-
-/// Images of an installed tool are built in the user's cache.
-std::filesystem::path build_folder() {
-  if (std::getenv("BMS_ROOT") != nullptr || installed().empty()) return source_tree() / "build" / "firmware";
-  if (const char* cache = std::getenv("XDG_CACHE_HOME"); cache != nullptr && *cache == '/')
-    return std::filesystem::path(cache) / "greybox-bms";
-  const char* home = std::getenv("HOME");
-  if (home == nullptr || *home != '/')
-    throw files::BadInput("HOME", 1, "no folder for firmware images, expected HOME or XDG_CACHE_HOME");
-  return std::filesystem::path(home) / ".cache" / "greybox-bms";
-}
-
-std::string cell_header_tool() {
-  const auto prefix = installed();
-  return prefix.empty() ? BMS_CELL_HEADER_TOOL : (prefix / "libexec/greybox/cell_header").string();
-}
-
-std::filesystem::path board_file(const std::string& board) {
-  const auto file = source_tree() / "boards" / board / "board.cmake";
+std::filesystem::path board_file(const std::string& board, const SourceTree& sources) {
+  const auto file = sources.folder / "boards" / board / "board.cmake";
   // board.cmake is run, so it must not come from elsewhere: "../DIR"
   const bool plain =
       !board.empty() &&
       board.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-") == std::string::npos;
   if (!plain || !std::filesystem::exists(file))
     throw files::BadInput(
-        board, 1, "no such board in " + (source_tree() / "boards").string() + ", expected the folder name of a board");
+        board, 1, "no such board in " + (sources.folder / "boards").string() + ", expected the folder name of a board");
   return file;
 }
 
@@ -109,9 +78,17 @@ const char* ending(Image image) {
   }
 }
 
-void check_cells(const std::string& board, std::size_t cells) {
-  const std::size_t fewest = std::stoul(board_setting(board, "BMS_FEWEST_CELLS")),
-                    most = std::stoul(board_setting(board, "BMS_MOST_CELLS"));
+std::string setting_of(const std::filesystem::path& file, const std::string& name) {
+  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
+  const std::string text = files::read_file(file);
+  std::smatch found;
+  if (!std::regex_search(text, found, line)) throw std::runtime_error("no " + name + " in " + file.string());
+  return found[2];
+}
+
+void check_cells(const std::string& board, std::size_t cells, const std::filesystem::path& file) {
+  const std::size_t fewest = std::stoul(setting_of(file, "BMS_FEWEST_CELLS")),
+                    most = std::stoul(setting_of(file, "BMS_MOST_CELLS"));
   if (cells < fewest || cells > most)
     throw files::BadInput(board, 1, fmt::format("{} cells, expected {} to {}", cells, fewest, most));
 }
@@ -130,7 +107,8 @@ struct Variant {
 /// A locked build folder of images.
 class BuildFolder {
  public:
-  explicit BuildFolder(const std::string& name) : path_(build_folder() / name), lock_(path_) {}
+  BuildFolder(const SourceTree& sources, const std::string& name)
+      : sources_(sources), path_(sources.builds / name), lock_(path_) {}
 
   bool is_new() const { return !std::filesystem::exists(path_ / "build.ninja"); }
   const std::filesystem::path& path() const { return path_; }
@@ -138,7 +116,7 @@ class BuildFolder {
   void configure(const Variant& variant, const std::vector<std::string>& options) const {
     std::vector<std::string> configure = {"cmake",
                                           "-S",
-                                          source_tree().string(),
+                                          sources_.folder.string(),
                                           "-B",
                                           path_.string(),
                                           "-G",
@@ -146,8 +124,8 @@ class BuildFolder {
                                           "-DBMS_BOARD=" + variant.board,
                                           "-DBMS_VEHICLE_PROFILE=" + variant.vehicle_profile,
                                           "--toolchain",
-                                          (source_tree() / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
-                                          "-DBMS_CELL_HEADER_TOOL=" + cell_header_tool()};
+                                          (sources_.folder / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
+                                          "-DBMS_CELL_HEADER_TOOL=" + sources_.cell_header_tool};
     if (variant.cells != 0) configure.push_back(fmt::format("-DBMS_CELLS={}", variant.cells));
     configure.insert(configure.end(), options.begin(), options.end());
     run_step(configure, log());
@@ -158,13 +136,14 @@ class BuildFolder {
  private:
   std::filesystem::path log() const { return path_ / "build.log"; }
 
+  const SourceTree& sources_;
   std::filesystem::path path_;
   Lock lock_;
 };
 
 /// Compiles what the cell does not decide on in an image. Returns the build folder.
-std::filesystem::path shared_objects(const Variant& variant, const std::string& image_name) {
-  const BuildFolder folder(variant.board + variant.ending());
+std::filesystem::path shared_objects(const SourceTree& sources, const Variant& variant, const std::string& image_name) {
+  const BuildFolder folder(sources, variant.board + variant.ending());
   if (folder.is_new()) folder.configure(variant, {});
   folder.build(image_name + "_shared");
   return folder.path();
@@ -174,7 +153,7 @@ std::filesystem::path shared_objects(const Variant& variant, const std::string& 
 
 std::vector<std::string> board_names() {
   std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(source_tree() / "boards")) {
+  for (const auto& entry : std::filesystem::directory_iterator(present_sources().folder / "boards")) {
     if (std::filesystem::exists(entry.path() / "board.cmake")) names.push_back(entry.path().filename());
   }
   std::sort(names.begin(), names.end());
@@ -182,12 +161,7 @@ std::vector<std::string> board_names() {
 }
 
 std::string board_setting(const std::string& board, const std::string& name) {
-  const std::regex line("(^|\n)set\\(" + name + " ([^ )]*)\\)");
-  const std::string text = files::read_file(board_file(board));
-  std::smatch found;
-  if (!std::regex_search(text, found, line))
-    throw std::runtime_error("no " + name + " in " + board_file(board).string());
-  return found[2];
+  return setting_of(board_file(board, present_sources()), name);
 }
 
 Image chip_image(const std::string& board) {
@@ -198,16 +172,21 @@ std::size_t board_cells(const std::string& board) { return std::stoul(board_sett
 
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
                                      const std::string& vehicle_profile, std::size_t cells) {
-  board_file(board);
-  const bool other_cells = cells != 0 && cells != board_cells(board);
-  if (other_cells) check_cells(board, cells);
+  return firmware_image(present_sources(), board, cell, image, vehicle_profile, cells);
+}
+
+std::filesystem::path firmware_image(const SourceTree& sources, const std::string& board, const files::CellFile& cell,
+                                     Image image, const std::string& vehicle_profile, std::size_t cells) {
+  const auto file = board_file(board, sources);
+  const bool other_cells = cells != 0 && cells != std::stoul(setting_of(file, "BMS_CELLS"));
+  if (other_cells) check_cells(board, cells, file);
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
   const Variant variant{board, vehicle_profile, other_cells ? cells : 0};
   const std::string image_name = fmt::format("bms_{}{}", board, ending(image));
-  const auto shared = shared_objects(variant, image_name);
-  const BuildFolder folder(fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash, variant.ending()));
+  const auto shared = shared_objects(sources, variant, image_name);
+  const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash, variant.ending()));
   const auto cell_path = folder.path() / "cell.toml";
   if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
     files::write_file(cell_path, cell.text);

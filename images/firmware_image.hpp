@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "files/cell_file.hpp"
+#include "images/source_tree.hpp"
 
 namespace bms::images {
 
@@ -19,6 +20,10 @@ enum class Image { application, remote, remote_product, replay, hil, bench, faul
 /// number of cells, and std::runtime_error if the build fails.
 std::filesystem::path firmware_image(const std::string& board, const files::CellFile& cell, Image image,
                                      const std::string& vehicle_profile = "none", std::size_t cells = 0);
+
+/// The same of other sources.
+std::filesystem::path firmware_image(const SourceTree& sources, const std::string& board, const files::CellFile& cell,
+                                     Image image, const std::string& vehicle_profile = "none", std::size_t cells = 0);
 
 /// Names of all boards, in alphabetical order.
 std::vector<std::string> board_names();

@@ -36,15 +36,16 @@ struct Range {
 };
 inline constexpr Range capacity_ah{0.01, 1'000};
 inline constexpr Range reference_temperature_c{-40, 80};
-inline constexpr Range voltage_v{0.5, 5};             ///< limits of use, and the OCV from SOC 0 to 1
-inline constexpr Range current_a{1e-3, 2'000};        ///< limits of use; a reading ends at 2,147 A
-inline constexpr Range slope_v{1e-6, 60};             ///< slope of the OCV, per unit of SOC
-inline constexpr Range resistance_ohm{1e-5, 0.5};     ///< R0 and R1
-inline constexpr Range capacitance_f{100, 100'000};   ///< C1
-inline constexpr Range time_constant_s{0.2, 50'000};  ///< R1 C1
-inline constexpr double least_width = 0.0005;         ///< of SOC, between any two edges or nodes
-inline constexpr Range lasts_s{0, 86'400};            ///< noise.model_correlation_s
-inline constexpr Range unknown_c{1e-3, 10};           ///< noise.current_unknown_a over the 1C current
+inline constexpr Range voltage_v{0.5, 5};               ///< limits of use, and the OCV from SOC 0 to 1
+inline constexpr Range current_a{1e-3, 2'000};          ///< limits of use; a reading ends at 2,147 A
+inline constexpr Range slope_v{1e-6, 60};               ///< slope of the OCV, per unit of SOC
+inline constexpr Range resistance_ohm{1e-5, 0.5};       ///< R0 and R1
+inline constexpr Range capacitance_f{100, 1'000'000};   ///< C1; of a fast pair of 400 Ah: 500,000 F
+inline constexpr double fixed_capacitance_f = 100'000;  ///< largest C1 in fixed point
+inline constexpr Range time_constant_s{0.2, 50'000};    ///< R1 C1
+inline constexpr double least_width = 0.0005;           ///< of SOC, between any two edges or nodes
+inline constexpr Range lasts_s{0, 86'400};              ///< noise.model_correlation_s
+inline constexpr Range unknown_c{1e-3, 10};             ///< noise.current_unknown_a over the 1C current
 inline constexpr double most_gain = 0.2, most_resistance_error = 1, most_resistance_per_ev = 1;
 
 }  // namespace accepted
@@ -224,7 +225,7 @@ constexpr CellFault fault_of(const RcTable<double>& r, const OcvTable<double>& o
     if (k > 0 && outside(r.soc[k] - r.soc[k - 1], 0.001, 1)) return {"rc.soc", k, "nodes that ascend by 0.001 or more"};
     if (beyond(r.r0_ohm[k], accepted::resistance_ohm)) return {"rc.r0_ohm", k, "0.00001 to 0.5 ohm"};
     if (beyond(r.r1_ohm[k], accepted::resistance_ohm)) return {"rc.r1_ohm", k, "0.00001 to 0.5 ohm"};
-    if (beyond(r.c1_f[k], accepted::capacitance_f)) return {"rc.c1_f", k, "100 to 100000 F"};
+    if (beyond(r.c1_f[k], accepted::capacitance_f)) return {"rc.c1_f", k, "100 to 1000000 F"};
     if (beyond(r.r1_ohm[k] * r.c1_f[k], accepted::time_constant_s))
       return {"rc.c1_f", k, "a time constant r1 * c1 of 0.2 to 50000 s"};
   }

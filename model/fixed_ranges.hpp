@@ -44,14 +44,16 @@ constexpr bool holds(Range range) {
 static_assert(holds<Voltage<S>>(accepted::voltage_v));
 static_assert(holds<Voltage<S>>(accepted::slope_v.high * outer_width), "the outer intervals of the OCV");
 static_assert(holds<Voltage<S>>(accepted::voltage_v.high + 0.5), "a reading that is plausible");
-static_assert(holds<Resistance<S>>(accepted::resistance_ohm) && holds<Capacitance<S>>(accepted::capacitance_f));
+static_assert(holds<Resistance<S>>(accepted::resistance_ohm));
+// fits_fixed_point() refuses a larger C1.
+static_assert(holds<Capacitance<S>>(accepted::fixed_capacitance_f));
 // Between two nodes R1 and C1 are linear, so R1 C1 is at least the smaller of both ends and at most the product of the
 // largest values.
-static_assert(holds<Duration<S>>(accepted::resistance_ohm.high * accepted::capacitance_f.high));
+static_assert(holds<Duration<S>>(accepted::resistance_ohm.high * accepted::fixed_capacitance_f));
 static_assert(holds<Rate<S>>(1 / (accepted::time_constant_s.low - 1e-3)),
               "with the rounding of R1, C1 and their product");
 static_assert(accepted::resistance_ohm.high * 2.0 / (1 << Capacitance<S>::fraction_bits) +
-                      accepted::capacitance_f.high * 2.0 / (1 << Resistance<S>::fraction_bits) <
+                      accepted::fixed_capacitance_f * 2.0 / (1 << Resistance<S>::fraction_bits) <
                   1e-3,
               "that rounding");
 static_assert(static_cast<double>(PerSoc<S>(2 / accepted::least_width)) >= 1 / accepted::least_width &&

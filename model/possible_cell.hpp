@@ -73,10 +73,11 @@ inline std::optional<ImpossibleOcv> first_impossible_ocv(const CellParameters<>&
   return first;
 }
 
-/// Returns true if fixed point holds these mechanisms: no value is rounded too much, and no resistance saturates at a
-/// temperature that the file allows.
+/// Returns true if fixed point holds the cell and these mechanisms: C1 is not too large, no value is rounded too much,
+/// and no resistance saturates at a temperature that the file allows.
 inline bool fits_fixed_point(const CellParameters<>& cell, std::span<const MechanismSetting> mechanisms) {
   bool fits = true;
+  for (std::size_t k = 0; k < cell.rc.c1_f.size; ++k) fits = fits && cell.rc.c1_f[k] <= accepted::fixed_capacitance_f;
   for (const MechanismSetting& m : mechanisms)
     fits = fits && catalogue[m.index].fits_fixed_point(m.value, cell.capacity_ah);
   const double most_ohm = static_cast<double>(Resistance<FixedPoint>::highest());

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "reports/cell_charts.hpp"
 #include "reports/report_page.hpp"
 
 namespace bms::reports {
@@ -11,6 +12,8 @@ namespace id = identification;
 namespace {
 
 files::PageCell text_cell(const std::string& text) { return {text, {}, {}}; }
+
+std::string file_name(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
 const char* remark(const id::Parameter& p) {
   if (!p.identifiable) return "not identifiable";
@@ -56,7 +59,7 @@ files::PageTable fit_table(const workflow::IdentifyResult& r) {
                          {},
                          ""};
   table.rows.push_back(fit_row("identification data", r.identification.estimation));
-  for (const auto& [path, fit] : r.validations) table.rows.push_back(fit_row(path, fit));
+  for (const auto& [path, fit] : r.validations) table.rows.push_back(fit_row(file_name(path), fit));
   return table;
 }
 
@@ -84,9 +87,10 @@ std::string identify_report(const workflow::IdentifyResult& r) {
       {parameter_table(found), fit_table(r)},
       {}};
   for (const measurement::Warning& w : r.warnings) page.warnings.push_back(w.text);
+  if (r.cell_file) page.charts = cell_charts(*r.cell_file);
   add_charts("Identification data", r.data.front(), found.estimation, page);
   for (std::size_t k = 0; k < r.validations.size(); ++k)
-    add_charts(r.validations[k].first, r.data[k + 1], r.validations[k].second, page);
+    add_charts(file_name(r.validations[k].first), r.data[k + 1], r.validations[k].second, page);
   return page_of(page);
 }
 

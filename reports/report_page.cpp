@@ -44,6 +44,8 @@ namespace {
 using nlohmann::json;
 using Value = std::function<double(std::size_t)>;
 
+constexpr std::size_t drawn_rows = 20'000;  ///< in each of five charts: a browser draws them in about a second
+
 /// Rounded, because further digits would only make the page larger.
 json column(const std::vector<std::size_t>& rows, int decimals, const Value& value) {
   const double scale = std::pow(10, decimals);
@@ -96,7 +98,7 @@ json figures(const host_sim::ReplayResult& r) {
 }
 
 std::string data(const host_sim::ReplayResult& r) {
-  const auto rows = shown_rows(r.recording);
+  const auto rows = shown_rows(r.recording, drawn_rows);
   const auto& e = r.track.rows;
   const measurement::Recording& rec = r.recording;
   json page = {{"title", "State of charge over " + file_name(r)},
@@ -256,16 +258,30 @@ json table_of(const files::PageTable& t) {
   return {{"title", t.title}, {"note", t.note}, {"table", {{"head", t.head}, {"rows", std::move(rows)}}}};
 }
 
+double rounded(double value) { return std::round(value * 1e5) / 1e5; }
+
+/// A value, or [low, middle, high] in a chart with bands.
+json point_of(const files::PageChart& c, std::size_t column, std::size_t k) {
+  const auto& values = c.columns[column];
+  const bool missing = k >= values.size() || !std::isfinite(values[k]);
+  if (c.half_band.empty()) return missing ? json(nullptr) : json(rounded(values[k]));
+  if (missing) return json::array({nullptr, nullptr, nullptr});
+  const double half = k < c.half_band[column].size() ? c.half_band[column][k] : 0;
+  return json::array({rounded(values[k] - half), rounded(values[k]), rounded(values[k] + half)});
+}
+
 json chart_of(const files::PageChart& c) {
   json rows = json::array();
   const std::size_t every = std::max<std::size_t>(1, c.time_s.size() / 8'000);
+  const bool time = c.x_title.empty();
   for (std::size_t k = 0; k < c.time_s.size(); k += every) {
-    json row = json::array({c.time_s[k] - c.time_s.front()});
-    for (const auto& column : c.columns)
-      row.push_back(k < column.size() ? json(std::round(column[k] * 1e5) / 1e5) : json(nullptr));
+    json row = json::array({time ? (c.time_s[k] - c.time_s.front()) / 3'600 : c.time_s[k]});
+    for (std::size_t column = 0; column < c.columns.size(); ++column) row.push_back(point_of(c, column, k));
     rows.push_back(std::move(row));
   }
-  return {{"title", c.title}, {"chart", {{"labels", c.labels}, {"rows", std::move(rows)}}}};
+  json chart = {{"labels", c.labels}, {"rows", std::move(rows)}, {"bands", !c.half_band.empty()}};
+  if (!time) chart["x"] = c.x_title;
+  return {{"title", c.title}, {"chart", std::move(chart)}};
 }
 
 }  // namespace

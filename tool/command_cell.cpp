@@ -8,6 +8,7 @@
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/cell_header.hpp"
+#include "reports/cell_charts.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
@@ -79,35 +80,11 @@ std::string shown(const files::CellFile& cell) {
 }
 
 files::PageContent plotted(const files::CellFile& cell) {
-  const model::CellParameters<>& p = cell.parameters;
-  files::PageChart ocv{"Open-circuit voltage over state of charge, %", {"OCV, V"}, {}, {{}}};
-  const bool gap = p.ocv.half_gap_v.size > 0;
-  if (gap) {
-    ocv.labels = {"OCV, V", "slow charge, V", "slow discharge, V"};
-    ocv.columns.resize(3);
-  }
-  for (std::size_t k = 0; k < p.ocv.soc.size; ++k) {
-    const double v = ocv_at(p.ocv, k);
-    ocv.time_s.push_back(100 * p.ocv.soc[k]);
-    ocv.columns[0].push_back(v);
-    if (!gap) continue;
-    ocv.columns[1].push_back(v + (1 - p.ocv.lean) * p.ocv.half_gap_v[k]);
-    ocv.columns[2].push_back(v - (1 + p.ocv.lean) * p.ocv.half_gap_v[k]);
-  }
-  files::PageChart resistance{"Resistances over state of charge, %", {"R0, mOhm", "R1, mOhm"}, {}, {{}, {}}};
-  files::PageChart capacitance{"C1 over state of charge, %", {"C1, F"}, {}, {{}}};
-  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
-    resistance.time_s.push_back(100 * p.rc.soc[k]);
-    capacitance.time_s.push_back(100 * p.rc.soc[k]);
-    resistance.columns[0].push_back(1e3 * p.rc.r0_ohm[k]);
-    resistance.columns[1].push_back(1e3 * p.rc.r1_ohm[k]);
-    capacitance.columns[0].push_back(p.rc.c1_f[k]);
-  }
   return {"Cell " + cell.name,
-          fmt::format("{}, {:g} Ah. {}", cell.chemistry, p.capacity_ah, cell.source),
+          fmt::format("{}, {:g} Ah. {}", cell.chemistry, cell.parameters.capacity_ah, cell.source),
           {},
           {},
-          {ocv, resistance, capacitance}};
+          reports::cell_charts(cell)};
 }
 
 /// Accepts the argument of an #include: a path in brackets or in quotes.

@@ -116,7 +116,7 @@ class DiagnoseCommand final : public Command {
     output_.protect(inputs);
     complete_reading(o_.reading);
     diagnosis::Options options;
-    options.progress = progress_on_terminal(0.1, progress_line);
+    options.progress = progress_on_stderr(0.1, progress_line);
     options.false_alarm_rate = false_alarm_rate_;
     options.stopped = [] { return interrupts != 0; };
     static_cast<void>(std::signal(SIGINT, on_interrupt));

@@ -114,7 +114,7 @@ class RunAction {
     const bool own = std::filesystem::equivalent(o_.manifest, depot.manifest(), error);
     const std::size_t units = own ? 0 : fleet::write_manifest(o_.manifest, o_.cell, depot.manifest());
     stop_on_interrupt();
-    const auto progress = progress_on_terminal(0.5, progress_line);
+    const auto progress = progress_on_stderr(0.5, progress_line);
     options.program = std::filesystem::read_symlink("/proc/self/exe");
     options.jobs = o_.jobs;
     options.stopped = [] { return interrupts != 0; };

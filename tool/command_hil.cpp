@@ -110,18 +110,14 @@ files::PageTable reaction_table(const hil::SessionResult& r) {
 
 std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, const hil::SessionResult& r,
                       const std::string& statement) {
-  files::PageChart soc{"State of charge",
-                       {"estimated, %", "estimated + two sigma", "estimated - two sigma", "true, %"},
-                       {},
-                       {{}, {}, {}, {}}};
-  files::PageChart current{"Current, > 0 charges", {"A"}, {}, {{}}};
+  files::PageChart soc{"State of charge", {"estimate with two sigma, %", "true, %"}, {}, {{}, {}}, {{}, {}}};
+  files::PageChart current{"Current, > 0 charges", {"measured, A"}, {}, {{}}};
   files::PageChart volts{"Cell voltages", {"lowest, V", "highest, V"}, {}, {{}, {}}};
   for (const hil::TracePoint& p : r.trace) {
     for (files::PageChart* c : {&soc, &current, &volts}) c->time_s.push_back(p.time_s);
     soc.columns[0].push_back(100 * p.soc);
-    soc.columns[1].push_back(100 * (p.soc + 2 * p.soc_sigma));
-    soc.columns[2].push_back(100 * (p.soc - 2 * p.soc_sigma));
-    soc.columns[3].push_back(100 * p.soc_true);
+    soc.half_band[0].push_back(200 * p.soc_sigma);
+    soc.columns[1].push_back(100 * p.soc_true);
     current.columns[0].push_back(p.current_a);
     volts.columns[0].push_back(p.lowest_v);
     volts.columns[1].push_back(p.highest_v);
@@ -193,7 +189,7 @@ hil::SessionResult compute(const HilOptions& options, const hil::SessionPlan& pl
     if (options.candump.empty()) return;
     monitor::append_dump_line(dump, monitor::to_bus_frame(f, std::llround(1e6 * time_s)), "can0");
   };
-  const auto show = progress_on_terminal(1, [](double done, double left_s, const std::string&) {
+  const auto show = progress_on_stderr(1, [](double done, double left_s, const std::string&) {
     return fmt::format("in the loop: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0);
   });
   return hil::run_session(*link, plan, record, [&](double done) {
@@ -236,8 +232,8 @@ class HilCommand final : public Command {
         "sense_wire=K cell_high=K cell_low=K (cell K),\n"
         "current_stuck current_open temperature_open temperature_stuck overcurrent welded precharge_open silence; each "
         "@START or @START-END in seconds\n"
-        "Example: bms hil --board netduinoplus2 --cell table9 --profile shift.csv --fault cell_open=3@600-660 --report "
-        "loop.html");
+        "Example: bms hil --board stm32f405_forklift --cell table9 --profile shift.csv --fault cell_open=3@600-660 "
+        "--report loop.html");
     c.add_option("--board", o_.board, "folder in boards/; it is emulated unless --port names a real one")
         ->capture_default_str();
     c.add_option("--port", o_.port, "serial port of a board that speaks SLCAN")->type_name("DEVICE");

@@ -2,8 +2,11 @@
 #include <filesystem>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "files/cell_file.hpp"
+#include "files/recording.hpp"
 #include "reports/identify_page.hpp"
 #include "reports/json_results.hpp"
 #include "tool/commands.hpp"
@@ -102,8 +105,12 @@ class IdentifyCommand final : public Command {
     add_method(c);
     c.add_option("--name", o_.name, "name of the cell; that of the output file if not given");
     c.add_option("--out", o_.out, "cell file to write")->required()->type_name("C.toml");
+    CLI::Option& each = *c.add_flag("--each-cell", each_cell_,
+                                    "of a pack recording: identify every cell and write OUT_cell1 and so on; without "
+                                    "it the mean cell is identified");
     add_reading(c, o_.reading);
     add_output(c, output_);
+    each.excludes("--report")->excludes("--extend")->excludes("--healthy");
     return &c;
   }
 
@@ -116,7 +123,7 @@ class IdentifyCommand final : public Command {
     complete_reading(o_.reading);
     parse();
     try {
-      return write(workflow::identify_cell(o_));
+      return each_cell_ ? identify_each_cell() : write(workflow::identify_cell(o_));
     } catch (const workflow::FailedFit& failed) {
       for (const measurement::Warning& w : failed.warnings) warn(w.text);
       fmt::print(stderr, "{}\n", files::printable(failed.what()));
@@ -125,6 +132,52 @@ class IdentifyCommand final : public Command {
   }
 
  private:
+  /// Identifies each cell of a pack as if it were alone. Returns the exit code: 1 if a cell has no cell file.
+  int identify_each_cell() const {
+    const measurement::Recording pack =
+        files::read_recording(o_.recordings.front(), files::VoltageColumn::required, o_.reading);
+    const std::size_t count = pack.cell_voltage_v.size();
+    if (count == 0)
+      throw files::BadInput(o_.recordings.front(), 1,
+                            "no columns v_1, v_2 and so on, expected the recording of a pack");
+    nlohmann::ordered_json cells = nlohmann::ordered_json::array();
+    bool all = true;
+    for (std::size_t k = 1; k <= count; ++k) {
+      workflow::IdentifyOptions one = o_;
+      one.reading.map.push_back(fmt::format("voltage_v=v_{}", k));
+      const std::filesystem::path out = o_.out;
+      one.out =
+          (out.parent_path() / fmt::format("{}_cell{}{}", out.stem().string(), k, out.extension().string())).string();
+      one.name = fmt::format("{}_cell{}", o_.name, k);
+      const workflow::IdentifyResult result = workflow::identify_cell(one);
+      all = all && result.cell_file;
+      if (result.cell_file) write_output(one.out, files::cell_text(*result.cell_file));
+      if (k == 1) {
+        for (const measurement::Warning& w : result.warnings) warn(w.text);
+      }
+      print_summary(output_, cell_line(k, result, one.out));
+      auto json = nlohmann::ordered_json::parse(reports::json_of(result));
+      json["cell_number"] = k;
+      json["out"] = one.out;
+      cells.push_back(std::move(json));
+    }
+    if (!output_.json.empty())
+      write_output(output_.json, nlohmann::ordered_json{{"command", "identify"}, {"cells", cells}}.dump(1) + "\n");
+    return all ? 0 : 1;
+  }
+
+  static std::string cell_line(std::size_t number, const workflow::IdentifyResult& result, const std::string& out) {
+    double r0_ohm = 0, r1_ohm = 0, nodes = 0;
+    for (const id::Parameter& p : result.identification.parameters) {
+      if (p.name == "r0_ohm") r0_ohm += p.value;
+      if (p.name == "r1_ohm") r1_ohm += p.value;
+      if (p.name == "r0_ohm") ++nodes;
+    }
+    return fmt::format("cell {:2}: {:.2f} mV RMS, mean R0 {:.4g} mOhm, R1 {:.4g} mOhm{}", number,
+                       1e3 * result.identification.estimation.rmse_v, 1e3 * r0_ohm / nodes, 1e3 * r1_ohm / nodes,
+                       result.cell_file ? ", " + out : ", no cell file");
+  }
+
   /// Returns the exit code: 1 if there is no cell file.
   int write(const workflow::IdentifyResult& result) const {
     if (result.cell_file) write_output(o_.out, files::cell_text(*result.cell_file));
@@ -231,6 +284,7 @@ class IdentifyCommand final : public Command {
 
   workflow::IdentifyOptions o_;
   IdentifyTexts texts_;
+  bool each_cell_ = false;
   Output output_;
 };
 

@@ -32,7 +32,7 @@ class LogReader {
 
   /// Returns false, after one line on standard error, if the data are not complete.
   bool read() {
-    const auto progress = progress_on_terminal(0.2, [](double, double, const std::string& what) { return what; });
+    const auto progress = progress_on_stderr(0.2, [](double, double, const std::string& what) { return what; });
     while (request_.state() == StoredDataRequest::State::waiting && !source_->ended()) {
       if (source_->live() && !ask()) return false;
       receive();

@@ -92,7 +92,7 @@ class ProofCommand final : public Command {
     o_.output.set_own("");
     check(o_);
     o_.output.protect(files_in(o_.data));
-    const proof::ProofResult result = proof::prove(o_.data, o_.only, progress_on_terminal(0.2, proof_progress));
+    const proof::ProofResult result = proof::prove(o_.data, o_.only, progress_on_stderr(0.2, proof_progress));
     if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(result));
     if (!o_.output.report.empty()) write_output(o_.output.report, reports::proof_report(result));
     print_summary(o_.output, summary(result));

@@ -16,6 +16,7 @@
 #include "measurement/recording_checks.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
+#include "tool/against.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/pack_cells.hpp"
@@ -36,6 +37,7 @@ struct ReplayOptions {
   bool verify = false;
   std::size_t cuts = 0;  ///< 0: no trials
   std::string trace;
+  AgainstOptions against;  ///< without what it shares with a replay
   files::ReadOptions reading;
   Output output;
 };
@@ -292,7 +294,9 @@ class ReplayCommand final : public Command {
                       ->check(CLI::Range(std::size_t{1}, std::size_t{1'000}))
                       ->type_name("N");
     for (const char* other : {"--initial-soc", "--run", "--target", "--verify", "--board-cell"}) cuts.excludes(other);
-    c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
+    CLI::Option& trace = *c.add_option("--trace", o_.trace, "write every estimate to a CSV file")->type_name("FILE");
+    add_against(c, {"--run", "--target", "--scalar", "--verify", "--board-cell", "--cuts", "--initial-soc"})
+        .excludes(&trace);
     add_reading(c, o_.reading);
     add_output(c, o_.output);
     for (const char* other : {"--trace", "--report"}) cuts.excludes(other);
@@ -302,7 +306,8 @@ class ReplayCommand final : public Command {
   int run() override {
     complete_reading(o_.reading);
     o_.output.set_own(o_.trace);
-    o_.output.protect({o_.recording, o_.cell, o_.board_cell});
+    o_.output.protect({o_.recording, o_.cell, o_.board_cell, o_.against.new_cell});
+    if (!o_.against.firmware.empty()) return run_against(against());
     if (o_.cuts > 0) return run_cut_trials(o_);
     ReplayRun run = read(o_);
     compute(o_, run);
@@ -310,6 +315,38 @@ class ReplayCommand final : public Command {
   }
 
  private:
+  /// others: options of a replay by one firmware.
+  CLI::Option& add_against(CLI::App& c, const std::vector<const char*>& others) {
+    AgainstOptions& a = o_.against;
+    CLI::Option& against = *c.add_option("--against", a.firmware,
+                                         "run the whole firmware of this image (*_hil.elf), checkout or commit over "
+                                         "the log, and the present one; exit code 1 if what they publish differs")
+                                ->check(not_empty())
+                                ->type_name("FIRMWARE");
+    for (const char* other : others) against.excludes(c.get_option(other));
+    c.add_option("--base", a.base, "with --against: the firmware to compare with, if it is not the one of this tool")
+        ->needs(&against)
+        ->type_name("FIRMWARE");
+    c.add_option("--against-cell", a.new_cell, "with --against: its cell file, if it is not --cell")
+        ->needs(&against)
+        ->type_name("CELL");
+    c.add_option("--board", a.board, "with --against: folder in boards/")->needs(&against)->capture_default_str();
+    c.add_option("--sample-s", a.sample_period_s, "with --against: sampling interval of the board in s")
+        ->needs(&against)
+        ->check(Within(0.01, 10.0))
+        ->capture_default_str();
+    return against;
+  }
+
+  AgainstOptions against() const {
+    AgainstOptions a = o_.against;
+    a.recording = o_.recording;
+    a.cell = o_.cell;
+    a.reading = o_.reading;
+    a.output = o_.output;
+    return a;
+  }
+
   ReplayOptions o_;
 };
 

@@ -17,6 +17,7 @@
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "tool/pack_cells.hpp"
 
 namespace bms::tool {
 
@@ -27,6 +28,7 @@ struct SimulateOptions {
   std::string recording, profile;  ///< one of the two
   std::vector<std::string> with;   ///< "ID:param=value,...": mechanisms to add, or to use instead of the cell's own
   double initial_soc = 0.5;
+  CLI::Option* initial_soc_given = nullptr;
   double noise_v = 0, noise_a = 0;  ///< standard deviations
   unsigned long seed = 1;
   std::string out;
@@ -41,6 +43,7 @@ struct SimulationRun {
   files::CellFile cell;
   measurement::Recording recording;
   std::vector<host_sim::SimulatedRow> rows;
+  std::vector<SimulatedCell> cells;  ///< of a pack recording
   host_sim::SimulationResult result;
 };
 
@@ -147,6 +150,7 @@ void compute(const SimulateOptions& options, SimulationRun& run) {
                                  .initial_soc = options.initial_soc});
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   check_range(options, run);
+  run.cells = simulate_cells(run.cell, run.recording);
   run.result = {.cell = run.cell.name,
                 .input = options.input(),
                 .out = options.out,
@@ -164,7 +168,9 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
   const measurement::Recording& r = run.recording;
   host_sim::GaussianNoise noise(options.seed);
   const bool temperature = !r.temperature_c.empty();  // a replay needs it, because mechanisms depend on it
-  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c\n" : "time_s,current_a,voltage_v,soc\n";
+  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c" : "time_s,current_a,voltage_v,soc";
+  for (const SimulatedCell& cell : run.cells) fmt::format_to(std::back_inserter(csv), ",v_{}", cell.number);
+  csv += '\n';
   csv.reserve(run.rows.size() * 48);
   for (std::size_t k = 0; k < run.rows.size(); ++k) {
     const double current_a = r.current_a[k] + options.noise_a * noise.next();
@@ -173,6 +179,8 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
     fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}", r.time_s[k], current_a, voltage_v,
                    run.rows[k].soc);
     if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
+    for (const SimulatedCell& cell : run.cells)
+      fmt::format_to(std::back_inserter(csv), ",{:.10g}", cell.voltage_v[k] + options.noise_v * noise.next());
     csv += '\n';
   }
   return csv;
@@ -181,8 +189,8 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
 files::PageContent page_content(const SimulationRun& run) {
   const measurement::Recording& r = run.recording;
   files::PageChart voltage{"Voltage, open loop", {"simulated, V"}, r.time_s.copy(), {{}}};
-  files::PageChart current{"Current, > 0 charges", {"A"}, r.time_s.copy(), {r.current_a.copy()}};
-  files::PageChart soc{"State of charge", {"%"}, r.time_s.copy(), {{}}};
+  files::PageChart current{"Current, > 0 charges", {"measured, A"}, r.time_s.copy(), {r.current_a.copy()}};
+  files::PageChart soc{"State of charge", {"simulated, %"}, r.time_s.copy(), {{}}};
   if (!r.voltage_v.empty()) {
     voltage.labels.push_back("measured, V");
     voltage.columns.push_back(r.voltage_v.copy());
@@ -191,18 +199,24 @@ files::PageContent page_content(const SimulationRun& run) {
     voltage.columns[0].push_back(row.voltage_v);
     soc.columns[0].push_back(100 * row.soc);
   }
-  return {
-      "Simulation of " + run.result.input, "Cell " + run.result.cell + ", open loop.", {}, {}, {voltage, current, soc}};
+  return {"Simulation of " + run.result.input.substr(run.result.input.rfind('/') + 1),
+          "Cell " + run.result.cell + ", open loop.",
+          {},
+          {},
+          {voltage, current, soc}};
 }
 
 void write(const SimulateOptions& options, const SimulationRun& run) {
   write_output(options.out, csv_of(options, run));
-  if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(run.result));
+  if (!options.output.json.empty())
+    write_output(options.output.json, run.cells.empty() ? reports::json_of(run.result)
+                                                        : with_cells(reports::json_of(run.result), run.cells));
   if (!options.output.report.empty()) write_output(options.output.report, reports::page_of(page_content(run)));
   if (options.out == "-") return;
   print_summary(options.output, fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % state of charge in {:.2f} h.",
                                             run.rows.size(), options.out, 100 * options.initial_soc,
                                             100 * run.result.final_soc, run.result.duration_s / 3'600));
+  if (!run.cells.empty()) print_summary(options.output, cells_text(run.cells));
 }
 
 class SimulateCommand final : public Command {
@@ -215,9 +229,9 @@ class SimulateCommand final : public Command {
     c.add_option("--profile", o_.profile, "current profile: a recording without voltage_v")
         ->type_name("FILE")
         ->excludes(recording);
-    c.add_option("--initial-soc", o_.initial_soc, "state of charge at the start, 0..1")
-        ->check(Within(0.0, 1.0))
-        ->capture_default_str();
+    o_.initial_soc_given = c.add_option("--initial-soc", o_.initial_soc,
+                                        "state of charge at the start, 0..1; if not given soc_ref, or else 0.5")
+                               ->check(Within(0.0, 1.0));
     c.add_option("--with", o_.with,
                  "mechanism to add, or to use instead of the cell's own, for example "
                  "ocv_hysteresis:half_gap_v=0.01,decay=40; may be repeated")
@@ -229,7 +243,7 @@ class SimulateCommand final : public Command {
     c.add_option("--noise-a", o_.noise_a, "standard deviation in A of noise added to the current in the output")
         ->check(Within(0.0, 1e6));
     c.add_option("--seed", o_.seed, "seed of the noise")->capture_default_str();
-    c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc")
+    c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc; of a pack also v_1 to v_N")
         ->required()
         ->type_name("FILE");
     add_reading(c, o_.reading);
@@ -242,6 +256,9 @@ class SimulateCommand final : public Command {
     o_.output.set_own(o_.out);
     o_.output.protect({o_.cell, o_.input()});
     SimulationRun run = read(o_);
+    const measurement::Column& known = run.recording.soc_ref;
+    if (o_.initial_soc_given->count() == 0 && !known.empty() && known.front() >= 0 && known.front() <= 1)
+      o_.initial_soc = known.front();
     compute(o_, run);
     write(o_, run);
     return 0;

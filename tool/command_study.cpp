@@ -1,8 +1,6 @@
 // bms study: the paper's comparison of models, optimisers and experiments, as tables and one page.
-#include <unistd.h>
-
 #include <algorithm>
-#include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <vector>
 
@@ -75,12 +73,12 @@ std::string page_of_study(const study::StudyResult& r) {
 }
 
 study::StudyProgress study_progress() {
-  if (!isatty(2)) return {};
-  const auto begin = std::chrono::steady_clock::now();
-  return [begin](std::size_t done, std::size_t all) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    fmt::print(stderr, "\r{} of {} identifications, about {:.0f} s left   {}", done, all,
-               seconds / static_cast<double>(done) * static_cast<double>(all - done), done == all ? "\n" : "");
+  const auto progress = progress_on_stderr(0.2, [](double, double left_s, const std::string& what) {
+    return fmt::format("{}, about {:.0f} s left", what, std::isfinite(left_s) ? left_s : 0);
+  });
+  return [progress](std::size_t done, std::size_t all) {
+    if (!progress) return;
+    progress(static_cast<double>(done) / static_cast<double>(all), fmt::format("{} of {} identifications", done, all));
   };
 }
 

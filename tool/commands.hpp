@@ -14,6 +14,7 @@ std::unique_ptr<Command> experiment_command();  ///< a current profile by name
 std::unique_ptr<Command> identify_command();    ///< recordings in, cell file out
 std::unique_ptr<Command> cell_command();        ///< checks, shows, scales and plots a cell file
 std::unique_ptr<Command> diagnose_command();    ///< where a cell file and recordings disagree, and why
+std::unique_ptr<Command> ammeter_command();     ///< errors of the current sensor from a log, and their correction
 std::unique_ptr<Command> fleet_command();       ///< many recordings of a depot: run, merge, report
 std::unique_ptr<Command> study_command();       ///< the paper's comparison of models, optimisers and experiments
 std::unique_ptr<Command> proof_command();       ///< the diagnosis of real recordings against measurements

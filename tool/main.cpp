@@ -4,10 +4,13 @@
 #include <fcntl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <csignal>
 #include <cstdio>
 #include <exception>
+#include <optional>
+#include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -15,6 +18,7 @@
 #include "files/bad_input.hpp"
 #include "tool/commands.hpp"
 #include "tool/output.hpp"
+#include "tool/progress.hpp"
 
 namespace {
 
@@ -24,8 +28,8 @@ using namespace bms::tool;
 std::vector<std::unique_ptr<Command>> all_commands() {
   std::vector<std::unique_ptr<Command>> commands;
   for (const auto make : {import_command, replay_command, simulate_command, experiment_command, identify_command,
-                          cell_command, diagnose_command, fleet_command, study_command, proof_command, hil_command,
-                          flash_command, monitor_command, log_command, service_command})
+                          cell_command, diagnose_command, ammeter_command, fleet_command, study_command, proof_command,
+                          hil_command, flash_command, monitor_command, log_command, service_command})
     commands.push_back(make());
   return commands;
 }
@@ -41,6 +45,38 @@ int refuse(const CLI::App& app, const CLI::ParseError& error) {
   return 2;
 }
 
+/// Changes of letters that make one word of the other.
+std::size_t distance(const std::string& a, const std::string& b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  for (std::size_t k = 0; k < row.size(); ++k) row[k] = k;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t before = row[0]++;
+    for (std::size_t k = 1; k <= b.size(); ++k) {
+      const std::size_t changed = before + (a[i - 1] == b[k - 1] ? 0 : 1);
+      before = row[k];
+      row[k] = std::min({changed, row[k] + 1, row[k - 1] + 1});
+    }
+  }
+  return row.back();
+}
+
+/// Why the first word was not understood; empty if it is a command or an option.
+std::string unknown_command(const std::vector<std::pair<CLI::App*, Command*>>& entries, const std::string& word) {
+  if (word.empty() || word.front() == '-') return "";
+  std::string nearest;
+  std::size_t changes = 3;  // more would be another word
+  for (const auto& [entry, command] : entries) {
+    const std::string name = entry->get_name();
+    if (name == word) return "";
+    if (const std::size_t by = distance(word, name); by < changes) {
+      changes = by;
+      nearest = name;
+    }
+  }
+  return "no such command '" + bms::files::printable(word) + "', expected one of those of bms --help" +
+         (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+}
+
 /// A file that is opened must not become a closed standard output, or results would be mixed. A closed pipe is an error
 /// like a full disk, not the end of the process.
 void prepare_standard_streams() {
@@ -52,6 +88,16 @@ void prepare_standard_streams() {
 }
 
 int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entries, int argc, char** argv) {
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first == "help" || first == "version") {
+    std::fputs(first == "help" ? app.help().c_str() : BMS_VERSION "\n", stdout);
+    check_standard_output();
+    return 0;
+  }
+  if (const std::string why = unknown_command(entries, first); !why.empty()) {
+    std::fprintf(stderr, "bms: %s\n", why.c_str());
+    return 2;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -59,7 +105,13 @@ int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entrie
   }
   for (const auto& [entry, command] : entries) {
     if (!entry->parsed()) continue;
+    const std::string name = entry->get_name();
+    // these are live, or a dialogue with a battery
+    const bool live = name == "monitor" || name == "log" || name == "service";
+    std::optional<Heartbeat> heartbeat;
+    if (!live) heartbeat.emplace(name);
     const int code = command->run();
+    heartbeat.reset();
     check_standard_output();
     return code;
   }

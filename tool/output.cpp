@@ -1,18 +1,14 @@
 #include "tool/output.hpp"
 
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <filesystem>
-#include <limits>
-#include <memory>
-#include <utility>
 
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
+#include "tool/progress.hpp"
 
 namespace bms::tool {
 
@@ -72,6 +68,7 @@ void write_output(const std::string& file, const std::string& text) {
 
 void print_summary(const Output& output, const std::string& text) {
   if (output.quiet || output.uses_standard_output()) return;
+  clear_progress();
   std::printf("%s\n", files::printable(text, true).c_str());
   check_standard_output();
 }
@@ -80,30 +77,9 @@ void check_standard_output() {
   if (std::fflush(stdout) != 0 || std::ferror(stdout) != 0) refuse_standard_output();
 }
 
-workflow::Progress progress_on_terminal(
-    double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line) {
-  if (!isatty(2)) return {};
-  struct Shown {
-    double at_s = -1;
-    std::size_t width = 0;
-  };
-  const auto begin = std::chrono::steady_clock::now();
-  return [begin, every_s, line = std::move(line), shown = std::make_shared<Shown>()](double done,
-                                                                                     const std::string& what) {
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    if (done >= 1) {
-      std::fprintf(stderr, "\r%*s\r", static_cast<int>(shown->width), "");
-    } else if (seconds - shown->at_s > every_s) {
-      const std::string text =
-          line(done, done > 0 ? seconds / done * (1 - done) : std::numeric_limits<double>::infinity(), what);
-      if (text.empty()) return;
-      *shown = {seconds, std::max(shown->width, text.size())};
-      std::fprintf(stderr, "\r%s", text.c_str());
-    }
-    std::fflush(stderr);
-  };
+void warn(const std::string& text) {
+  clear_progress();
+  std::fprintf(stderr, "warning: %s\n", files::printable(text).c_str());
 }
-
-void warn(const std::string& text) { std::fprintf(stderr, "warning: %s\n", files::printable(text).c_str()); }
 
 }  // namespace bms::tool

@@ -1,11 +1,10 @@
 // Where results go: the part that all commands do in the same way.
 #pragma once
 
-#include <functional>
 #include <string>
 #include <vector>
 
-#include "workflow/progress.hpp"
+#include "tool/progress.hpp"
 
 namespace bms::tool {
 
@@ -29,11 +28,6 @@ void write_output(const std::string& file, const std::string& text);
 /// Prints a summary for a person, unless --quiet is given or standard output carries a result. Throws BadInput when it
 /// cannot be printed.
 void print_summary(const Output& output, const std::string& text);
-
-/// Shows progress on one line of the terminal, at most every `every_s` seconds; shows nothing if standard error is not
-/// a terminal. line: text for the share done (0..1), the time left in s (infinite at first) and the current part.
-workflow::Progress progress_on_terminal(
-    double every_s, std::function<std::string(double done, double left_s, const std::string& what)> line);
 
 /// Throws BadInput if something that was printed on standard output did not get there: a full disk, a closed pipe.
 void check_standard_output();

@@ -1,9 +1,12 @@
 #include "tool/pack_cells.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+
+#include "host_sim/simulation.hpp"
 
 namespace bms::tool {
 
@@ -39,6 +42,65 @@ std::string with_cells(const std::string& json, const std::vector<PackCell>& cel
     one["prediction_rmse_v"] = c.prediction_rmse_v ? nlohmann::ordered_json(*c.prediction_rmse_v) : nullptr;
     list.push_back(one);
   }
+  all["cells"] = list;
+  return all.dump(1) + "\n";
+}
+
+namespace {
+
+/// Charge of the recording in capacities, as the simulation counts it.
+double counted_soc(const measurement::Recording& r, double capacity_ah) {
+  double sum_as = 0, last_a = 0;
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    if (std::isfinite(r.current_a[k])) last_a = r.current_a[k];
+    if (k > 0) sum_as += last_a * (r.time_s[k] - r.time_s[k - 1]);
+  }
+  return sum_as / 3'600 / capacity_ah;
+}
+
+}  // namespace
+
+std::vector<SimulatedCell> simulate_cells(const files::CellFile& cell, const measurement::Recording& pack) {
+  const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
+  const double counted = counted_soc(pack, cell.parameters.capacity_ah);
+  std::vector<SimulatedCell> cells;
+  for (std::size_t k = 0; k < pack.cell_voltage_v.size(); ++k) {
+    const measurement::Recording one = measurement::cell(pack, k);
+    const auto track = host_sim::run_on_host(cell, measurement::samples(one), {}, host_sim::ScalarKind::float64);
+    SimulatedCell found{k + 1, std::clamp(track.rows.back().soc - counted, 0.0, 1.0), 0, {}};
+    double squares = 0, count = 0;
+    for (const host_sim::SimulatedRow& row : host_sim::simulate({.cell = tables,
+                                             .capacity_ah = cell.parameters.capacity_ah,
+                                             .mechanisms = cell.mechanisms,
+                                             .time_s = one.time_s,
+                                             .current_a = one.current_a,
+                                             .temperature_c = one.temperature_c,
+                                             .initial_soc = found.initial_soc})) {
+      const double error_v = one.voltage_v[found.voltage_v.size()] - row.voltage_v;
+      if (std::isfinite(error_v)) {
+        squares += error_v * error_v;
+        ++count;
+      }
+      found.voltage_v.push_back(row.voltage_v);
+    }
+    found.rmse_v = count > 0 ? std::sqrt(squares / count) : std::nan("");
+    cells.push_back(std::move(found));
+  }
+  return cells;
+}
+
+std::string cells_text(const std::vector<SimulatedCell>& cells) {
+  const auto [best, worst] =
+      std::minmax_element(cells.begin(), cells.end(), [](const auto& a, const auto& b) { return a.rmse_v < b.rmse_v; });
+  return fmt::format("Cells: {:.2f} mV RMS (cell {}) to {:.2f} mV RMS (cell {}).", 1e3 * best->rmse_v, best->number,
+                     1e3 * worst->rmse_v, worst->number);
+}
+
+std::string with_cells(const std::string& json, const std::vector<SimulatedCell>& cells) {
+  auto all = nlohmann::ordered_json::parse(json);
+  auto list = nlohmann::ordered_json::array();
+  for (const SimulatedCell& c : cells)
+    list.push_back({{"cell", c.number}, {"initial_soc", c.initial_soc}, {"rmse_v", c.rmse_v}});
   all["cells"] = list;
   return all.dump(1) + "\n";
 }

@@ -24,7 +24,7 @@
     get('verdict').style.background = verdicts[report.verdict];
     get('statement').textContent = signs(report.statement);
     get('subtitle').textContent = report.subtitle;
-    get('warnings').textContent = report.warnings.join(' \u00b7 ');
+    drawing.warnings(get('warnings'), report.warnings);
     const caption = id => get(id).previousElementSibling.firstChild;
     if (!report.named) caption('before-after').textContent = 'Compared with the noise floor ';
     if (!report.named) caption('why').textContent = 'Why no cause is named ';
@@ -38,7 +38,7 @@
     hint(
         draw(s, 'text', {x: 0, y: y + 4, class: r.strong ? 'strong' : ''}, cut(r.name, left - 6)),
         r.name + (r.hint ? ': ' + r.hint : ''));
-    draw(s, 'rect', {x: left, y: y - 5, width: room, height: 10, fill: '#f1f4f7'});
+    draw(s, 'rect', {x: left, y: y - 5, width: room, height: 10, fill: drawing.colour('head')});
     if (r.value !== null) {
       const from = x(r.zero || 0), to = x(r.value);
       const size = {x: Math.min(from, to), y: y - 5, width: Math.max(1.5, Math.abs(to - from)), height: 10};
@@ -295,7 +295,9 @@
       legend: 'always',
       colors: columns.map(column => column.colour),
       axisLabelFontSize: 12,
-      gridLineColor: '#e3e8ee',
+      gridLineColor: drawing.faint,
+      xlabel: 'time, h:mm',
+      xLabelHeight: 15,
       strokeWidth: 1.2,
       digitsAfterDecimal: 4,
       axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
@@ -311,7 +313,7 @@
         volts.push({label: 'extended, V', values: c.extended_v, colour: blue});
         errors.push({label: 'extended, mV', values: c.after_mv, colour: blue});
       }
-      volts.push({label: 'measured, V', values: c.measured_v, colour: '#2a2f36'});
+      volts.push({label: 'measured, V', values: c.measured_v, colour: dark});
       const pair = [
         chart(c, 'Voltage, open loop: ' + name, volts, true),
         chart(c, 'Measured minus simulated voltage: ' + name, errors, false),

@@ -2,7 +2,7 @@
 const regimes = (() => {
   'use strict';
   const {make, draw, svg, hint, percent, mv, ticks, red, blue, grey} = drawing;
-  const sand = '#f6e3b4', high = 104, left = 30, top = 18, bottom = top + high;
+  const sand = drawing.colour('sand'), high = 104, left = 30, top = 18, bottom = top + high;
 
   /// Marks the range with most of the mismatch.
   const mark_found = (s, found, x, width) => {

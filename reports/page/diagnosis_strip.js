@@ -3,7 +3,7 @@ const strip = (() => {
   'use strict';
   const {draw, svg, ticks, clock, mv, green, dark, faint} = drawing;
   const palette = [[247, 249, 250], [255, 214, 110], [228, 87, 46], [122, 20, 60]];
-  const amber = '#a86a00', left = 118, right = 8, gap = 7, top = 14;
+  const amber = drawing.colour('amber'), left = 118, right = 8, gap = 7, top = 14;
 
   /// Colour of an error, 0..1.
   const shade = t => {
@@ -136,7 +136,7 @@ const strip = (() => {
       for (const lane of lanes) {
         const style = lane.kind === 'heat' ? 'strong' : '';
         if (n === 0) draw(s, 'text', {x: 0, y: y + lane.height / 2 + 4, class: style}, lane.title);
-        draw(s, 'rect', {x: x0, y: y, width: p.wide, height: lane.height, fill: '#fff', stroke: faint});
+        draw(s, 'rect', {x: x0, y: y, width: p.wide, height: lane.height, fill: drawing.colour('card'), stroke: faint});
         if (lane.kind === 'heat')
           heat_lane(s, r, p, lane, y, most);
         else

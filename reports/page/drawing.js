@@ -38,6 +38,63 @@ const drawing = (() => {
     const s = Math.round(h * 3600), two = n => String(n).padStart(2, '0');
     return Math.floor(s / 3600) + ':' + two(Math.floor(s / 60) % 60) + (s % 60 ? ':' + two(s % 60) : '');
   };
+  const colour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
+  /// Lists the warnings in an element. Those that differ only in their numbers are shown once.
+  const warnings = (element, texts) => {
+    const groups = new Map();
+    for (const text of texts) {
+      const kind = text.replace(/[0-9.]+/g, '#');
+      groups.set(kind, [...(groups.get(kind) || []), text]);
+    }
+    if (groups.size === 0) return element.remove();
+    const list = make(element.parentElement, 'ul', undefined, 'warnings');
+    list.id = element.id;
+    element.replaceWith(list);
+    for (const [first, ...more] of groups.values()) {
+      const item = make(list, 'li', first);
+      if (more.length === 0) continue;
+      const rest = make(item, 'details');
+      make(rest, 'summary', `and ${more.length} more of this kind`);
+      for (const text of more) make(rest, 'div', text);
+    }
+  };
+  /// The colour of a line by what it shows: the same on every page.
+  const meaning = [
+    [/^(measured|present)/, 'measured'], [/open loop/, 'open-loop'], [/reference|^true/, 'reference'],
+    [/simulated|estimate|predicted|^new|model/, 'model']
+  ];
+  const colours_of = labels => {
+    const free = ['model', 'reference', 'current', 'other', 'open-loop', 'measured'];
+    const named = labels.map(label => (meaning.find(([pattern]) => pattern.test(label)) || [])[1]);
+    const rest = free.filter(name => !named.includes(name));
+    return labels.map((_, k) => colour(named[k] || rest.shift() || 'hint'));
+  };
+  /// A chart over the time in hours, or over `x` if it is given. more: options of Dygraph.
+  const chart = (div, labels, rows, legend, more = {}) => {
+    const time = {axisLabelFormatter: clock, valueFormatter: clock};
+    return new Dygraph(div, rows, {
+      labels: [more.x || 'time', ...labels],
+      xlabel: more.x || 'time, h:mm',
+      xLabelHeight: 15,
+      labelsDiv: legend,
+      legend: 'always',
+      colors: colours_of(labels),
+      axisLabelFontSize: 12,
+      gridLineColor: colour('grid'),
+      axisLineColor: colour('grid'),
+      strokeWidth: 1.3,
+      fillAlpha: 0.22,
+      ...more,
+      axes: {x: more.x ? {} : time, y: {axisLabelWidth: 58, pixelsPerLabel: 24}, ...more.axes},
+    });
+  };
+  /// Charts of a printed page are as wide as the paper.
+  addEventListener('beforeprint', () => {
+    for (const c of window.charts || []) c.resize(Math.min(680, c.width_), c.height_);
+  });
+  addEventListener('afterprint', () => {
+    for (const c of window.charts || []) c.resize();
+  });
   return {
     get,
     make,
@@ -49,11 +106,14 @@ const drawing = (() => {
     percent,
     mv,
     clock,
-    red: '#d1495b',
-    blue: '#0b63b5',
-    green: '#2e7d4f',
-    dark: '#1c2430',
-    grey: '#66707c',
-    faint: '#e3e8ee'
+    colour,
+    warnings,
+    chart,
+    red: colour('reference'),
+    blue: colour('model'),
+    green: colour('current'),
+    dark: colour('measured'),
+    grey: colour('hint'),
+    faint: colour('grid')
   };
 })();

@@ -87,6 +87,7 @@
       drawPoints: true,
       pointSize: 3,
       strokeWidth: 1,
+      xlabel: 'time',
       ylabel: title + ', %',
       axisLabelFontSize: 12,
       gridLineColor: drawing.faint,

@@ -34,6 +34,8 @@
               legend: 'always',
               axisLabelFontSize: 12,
               gridLineColor: faint,
+              xlabel: 'time, h:mm',
+              xLabelHeight: 15,
               strokeWidth: 1.5,
               connectSeparatedPoints: false,
               axes: {x: time_axis, y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(digits)}}
@@ -41,9 +43,9 @@
             options));
   };
   chart('soc', ['%'], {customBars: true, colors: [blue], fillAlpha: 0.22}, 2);
-  chart('current', ['A'], {colors: [green], fillGraph: true, fillAlpha: 0.15}, 2);
+  chart('current', ['A'], {colors: [dark], fillGraph: true, fillAlpha: 0.15}, 2);
   chart('voltage', ['V'], {colors: [dark]}, 3);
-  chart('temperature', ['\u00b0C'], {colors: ['#c9772b']}, 1);
+  chart('temperature', ['\u00b0C'], {colors: [dark]}, 1);
   const start_cells = count => {
     cell_count = count;
     get('figure-cells').hidden = false;

@@ -4,8 +4,8 @@
   'use strict';
   const {get, make, draw, signs, ticks, red, blue, green, dark, faint} = drawing;
   const svg = (parent, width, height) => drawing.svg(parent, width, height, {style: `width:${width}px`});
-  const amber = '#a86a00';
-  const curves = [blue, '#7a4fb0', amber];
+  const amber = drawing.colour('amber');
+  const curves = [blue, drawing.colour('other'), amber];
   /// About three digits.
   const short = v => {
     if (Math.abs(v) >= 100) return v.toFixed(0);

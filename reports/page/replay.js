@@ -1,10 +1,10 @@
 // Draws the page from `report`: {title, statement, warnings, figures: [[name, value] | [group]], columns: {...}}.
 (() => {
   'use strict';
-  const {clock} = drawing;
+  const {clock, colour, get, warnings} = drawing;
   document.getElementById('title').textContent = report.title;
   document.getElementById('statement').textContent = report.statement;
-  document.getElementById('warnings').textContent = report.warnings.join(' \u00b7 ');
+  warnings(get('warnings'), report.warnings);
 
   const table = document.getElementById('figures');
   for (const row of report.figures) {
@@ -23,19 +23,8 @@
   const at = column => k => column[k];
   const band = (middle, half) => k => [100 * (middle[k] - half[k]), 100 * middle[k], 100 * (middle[k] + half[k])];
 
-  const chart = (name, labels, data, options) => new Dygraph(
-      document.getElementById('chart-' + name), data,
-      Object.assign(
-          {
-            labels: ['time', ...labels],
-            labelsDiv: document.getElementById('legend-' + name),
-            legend: 'always',
-            axisLabelFontSize: 12,
-            gridLineColor: '#e3e8ee',
-            strokeWidth: 1.3,
-            axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
-          },
-          options));
+  const chart = (name, labels, data, options) =>
+      drawing.chart(get('chart-' + name), labels, data, get('legend-' + name), options);
 
   const in_percent = {
     x: {axisLabelFormatter: clock, valueFormatter: clock},
@@ -54,14 +43,14 @@
     soc_series.push(k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * c.soc_ref[k]));
   }
   const charts = [
+    chart('soc', soc_labels, rows(soc_series), {customBars: true, axes: in_percent}),
     chart(
-        'soc', soc_labels, rows(soc_series),
-        {customBars: true, colors: ['#0b63b5', '#d1495b'], axes: in_percent, fillAlpha: 0.22}),
+        'voltage', ['predicted one step ahead, V', 'open loop, V', 'measured, V'],
+        rows([at(c.predicted_v), at(c.open_loop_v), at(c.voltage_v)])),
+    chart('current', ['measured, A'], rows([at(c.current_a)]), {fillGraph: true, fillAlpha: 0.15}),
     chart(
-        'voltage', ['open loop, V', 'measured, V', 'predicted one step ahead, V'],
-        rows([at(c.open_loop_v), at(c.voltage_v), at(c.predicted_v)]), {colors: ['#c9a227', '#2a2f36', '#0b63b5']}),
-    chart('current', ['A'], rows([at(c.current_a)]), {colors: ['#2e7d4f'], fillGraph: true, fillAlpha: 0.15}),
-    chart('innovation', ['mV'], rows([at(c.innovation_mv)]), {colors: ['#7a4fb0'], valueRange: range(c.innovation_mv)}),
+        'innovation', ['mV'], rows([at(c.innovation_mv)]),
+        {colors: [colour('other')], valueRange: range(c.innovation_mv)}),
   ];
   if (c.soc_ref) {
     // the error should stay within the filter's own band around zero
@@ -69,9 +58,9 @@
           error = k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * (c.soc[k] - c.soc_ref[k]));
     charts.push(chart('error', ['two sigma, %', 'error, %'], rows([band(zeros, c.two_sigma), error]), {
       customBars: true,
-      colors: ['#9db8d2', '#d1495b'],
+      colors: [colour('model'), colour('reference')],
       axes: in_percent,
-      fillAlpha: 0.35,
+      fillAlpha: 0.3,
       valueRange: range(c.soc.map((v, k) => 100 * Math.max(Math.abs(v - c.soc_ref[k]), c.two_sigma[k])))
     }));
   } else {

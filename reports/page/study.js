@@ -1,13 +1,12 @@
 // Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text,
-// paper}]]}} | {title, chart: {labels, rows}}]}.
+// paper}]]}} | {title, chart: {labels, rows, x, bands}}]}. x: title of the axis if it is not the time.
 (() => {
   'use strict';
-  const {make} = drawing;
+  const {make, get, chart, warnings} = drawing;
   document.getElementById('title').textContent = report.title;
   document.getElementById('statement').textContent = report.statement;
-  document.getElementById('warnings').textContent = report.warnings.join(' \u00b7 ');
+  warnings(get('warnings'), report.warnings);
   const sections = document.getElementById('sections');
-  const colors = ['#0b63b5', '#d1495b', '#2e7d4f', '#c9a227', '#7a4fb0', '#2a2f36'];
   window.charts = [];
   for (const section of report.sections) {
     const box = make(sections, 'figure');
@@ -27,16 +26,8 @@
     } else {
       const legend = make(caption, 'span', '', 'legend');
       const div = make(box, 'div', undefined, 'chart tall');
-      window.charts.push(new Dygraph(div, section.chart.rows, {
-        labels: ['time, s', ...section.chart.labels],
-        labelsDiv: legend,
-        legend: 'always',
-        colors: colors,
-        axisLabelFontSize: 12,
-        gridLineColor: '#e3e8ee',
-        strokeWidth: 1.2,
-        axes: {y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
-      }));
+      const {labels, rows, x, bands} = section.chart;
+      window.charts.push(chart(div, labels, rows, legend, {x, customBars: bands, drawPoints: x !== undefined}));
     }
     if (section.note) make(box, 'p', section.note, 'note');
   }

@@ -133,6 +133,67 @@ TEST_F(Hil, ARecordedCurrentFlowsOnlyThroughClosedContactors) {
   for (const Json& fault : cut["faults"]) EXPECT_NE(fault["name"], "ContactorWelded");
 }
 
+/// Two minutes of pulses of one cell, by the model itself.
+std::string short_log(const std::filesystem::path& folder) {
+  const std::string log = (folder / "log.csv").string();
+  std::string csv = "time_s,current_a\n";
+  for (int k = 0; k <= 120; ++k) csv += fmt::format("{},{}\n", k, k % 40 < 20 ? 0.0 : -5.8);
+  files::write_file(folder / "pulses.csv", csv);
+  EXPECT_EQ(run_tool("simulate --cell table9 --initial-soc 0.6 --profile " + (folder / "pulses.csv").string() +
+                     " --out " + log)
+                .exit_code,
+            0);
+  return log;
+}
+
+TEST_F(Hil, TheSameFirmwareOnALogShowsNoDifference) {
+  const auto r = run_tool("replay " + short_log(folder_.path()) + " --against " BMS_SOURCE_DIR " --json -");
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  EXPECT_EQ(j["differences"], 0) << j["first"].dump();
+  EXPECT_TRUE(j["first"].is_null());
+  EXPECT_GT(j["samples"], 1'200);
+  EXPECT_EQ(j["cells"], 16);
+}
+
+TEST_F(Hil, ALimitFivePercentLowerIsShownForWhatItDoesToALog) {
+  std::string cell = content(BMS_SOURCE_DIR "/model/cells/table9.toml");
+  const std::string limit = "discharge_current_max_a = 6.0";
+  const std::size_t at = cell.find(limit);
+  ASSERT_NE(at, std::string::npos);
+  files::write_file(folder_.path() / "lower.toml", cell.replace(at, limit.size(), "discharge_current_max_a = 5.7"));
+  const auto r = run_tool("replay " + short_log(folder_.path()) + " --against " BMS_SOURCE_DIR " --against-cell " +
+                          (folder_.path() / "lower.toml").string() + " --json -");
+  ASSERT_EQ(r.exit_code, 1) << r.err;
+  const Json j = of(r);
+  EXPECT_GT(j["differences"], 100);
+  bool found = false;
+  for (const Json& signal : j["signals"]) {
+    if (signal["name"] != "AllowedCurrent.Discharge") continue;
+    found = true;
+    EXPECT_NEAR(signal["largest"], 0.3, 0.05);
+  }
+  EXPECT_TRUE(found) << j.dump();
+  EXPECT_EQ(j["above_allowed_s"]["before"], 0);
+  EXPECT_NEAR(j["above_allowed_s"]["after"], 60, 10) << "5.8 A of 5.7 A";
+}
+
+TEST_F(Hil, TwoBatteriesThatStaySwitchedOffAreNotCalledEqual) {
+  const auto r = run_tool("replay " + short_log(folder_.path()) + " --against " BMS_SOURCE_DIR " --sample-s 5");
+  EXPECT_EQ(r.exit_code, 2) << r.out;
+  EXPECT_THAT(r.err, HasSubstr("does not close its contactors"));
+}
+
+TEST_F(Hil, AnImageForTheChipOrAnUnknownCommitIsRefused) {
+  const std::string log = short_log(folder_.path());
+  const auto commit = run_tool("replay " + log + " --against no_such_commit");
+  EXPECT_EQ(commit.exit_code, 2);
+  EXPECT_THAT(commit.err, HasSubstr("expected an image for the loop"));
+  const auto file = run_tool("replay " + log + " --against " + log);
+  EXPECT_EQ(file.exit_code, 2);
+  EXPECT_THAT(file.err, HasSubstr("not a firmware image"));
+}
+
 TEST_F(Hil, RefusesInvalidInputInOneLine) {
   EXPECT_EQ(run_tool("hil").exit_code, 2);
   EXPECT_EQ(run_tool("hil --profile " + shift + " --recording " + shift).exit_code, 2);

@@ -1,7 +1,9 @@
 // bms import as a user calls it: every sample of log_samples is read with the right values, or refused with the reason.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
+#include <array>
 #include <cmath>
 #include <map>
 #include <sstream>
@@ -223,6 +225,52 @@ TEST_F(ImportFiles, WithoutTheOptionItIsAnErrorAndWithConfirmationItIsRead) {
   EXPECT_THAT(content(path("b.csv")), HasSubstr("15,2.5,3.249"));
   EXPECT_EQ(run_tool("import " + csv + " --discharge-positive --out " + path("c.csv")).exit_code, 0);
   EXPECT_THAT(content(path("c.csv")), HasSubstr("15,-2.5,3.249"));
+}
+
+/// Two cells in series whose states of charge differ by 12 %, by the model itself.
+TEST_F(ImportFiles, APackIsSimulatedAndIdentifiedCellByCell) {
+  std::string profile = "time_s,current_a\n";
+  for (int k = 0; k <= 7'200; ++k) {
+    constexpr std::array<double, 3> drive = {-5.5, 2.0, -1.0};
+    const double drive_a = drive[static_cast<std::size_t>(k) / 60 % 3];
+    profile += std::to_string(k) + "," + std::to_string(k < 900 ? 0.0 : drive_a) + "\n";
+  }
+  write("p.csv", profile);
+  std::vector<std::vector<std::string>> lines;
+  for (const char* soc : {"0.83", "0.71"}) {
+    ASSERT_EQ(run_tool("simulate --cell table9 --noise-v 0.0005 --profile " + path("p.csv") + " --initial-soc " + soc +
+                       " --out " + path("c.csv"))
+                  .exit_code,
+              0);
+    std::istringstream in(content(path("c.csv")));
+    lines.emplace_back();
+    for (std::string line; std::getline(in, line);) lines.back().push_back(line);
+  }
+  std::string pack = "time_s,current_a,v_1,v_2\n";
+  for (std::size_t k = 1; k < lines[0].size(); ++k) {
+    const auto voltage = [&](std::size_t cell) {
+      const std::string& line = lines[cell][k];
+      const std::size_t at = line.find(',', line.find(',') + 1) + 1;
+      return line.substr(at, line.find(',', at) - at);
+    };
+    pack += lines[0][k].substr(0, lines[0][k].find(',', lines[0][k].find(',') + 1)) + "," + voltage(0) + "," +
+            voltage(1) + "\n";
+  }
+  const std::string log = write("pack.csv", pack);
+  const ToolRun simulated = run_tool("simulate --cell table9 --initial-soc 0.77 --recording " + log + " --out " +
+                                     path("s.csv") + " --json -");
+  ASSERT_EQ(simulated.exit_code, 0) << simulated.err;
+  const auto cells = nlohmann::json::parse(simulated.out)["cells"];
+  ASSERT_EQ(cells.size(), 2U);
+  EXPECT_NEAR(cells[0]["initial_soc"], 0.83, 0.01);
+  EXPECT_NEAR(cells[1]["initial_soc"], 0.71, 0.01);
+  EXPECT_LT(cells[1]["rmse_v"], 0.002);
+  EXPECT_THAT(content(path("s.csv")), HasSubstr("time_s,current_a,voltage_v,soc,v_1,v_2"));
+  const ToolRun identified =
+      run_tool("identify --each-cell --nodes 0.5,0.8 --recording " + log + " --out " + path("my.toml"));
+  EXPECT_EQ(identified.exit_code, 0) << identified.err;
+  EXPECT_THAT(content(path("my_cell1.toml")), HasSubstr("my_cell1"));
+  EXPECT_THAT(content(path("my_cell2.toml")), HasSubstr("my_cell2"));
 }
 
 }  // namespace

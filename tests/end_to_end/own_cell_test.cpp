@@ -19,12 +19,13 @@ using nlohmann::json;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// A cell of one RC branch without hysteresis, stepped exactly. Nothing of model/ is used.
+/// A cell of one RC branch without hysteresis, stepped exactly. Nothing of model/ is used. size: cells of 100 Ah in
+/// parallel.
 class Truth {
  public:
   static constexpr double capacity_ah = 100, r0_ohm = 0.0006, r1_ohm = 0.0004, c1_f = 60'000;
 
-  explicit Truth(double soc) : soc_(soc) {}
+  Truth(double soc, double size) : size_(size), soc_(soc) {}
   static double ocv(double soc) {
     constexpr std::array<double, 12> at = {0, 0.03, 0.1, 0.2, 0.3, 0.4, 0.6, 0.65, 0.7, 0.9, 0.97, 1};
     constexpr std::array<double, 12> volt = {2.75,  3.05,  3.205, 3.245, 3.275, 3.287,
@@ -33,7 +34,8 @@ class Truth {
     while (k + 2 < at.size() && soc > at[k + 1]) ++k;
     return volt[k] + (volt[k + 1] - volt[k]) * (soc - at[k]) / (at[k + 1] - at[k]);
   }
-  void step(double current_a, double seconds) {
+  void step(double current_of_all_a, double seconds) {
+    const double current_a = current_of_all_a / size_;
     const double decay = std::exp(-seconds / (r1_ohm * c1_f));
     rc_v_ = decay * rc_v_ + (1 - decay) * r1_ohm * current_a;
     soc_ += current_a * seconds / 3'600 / capacity_ah;
@@ -45,16 +47,18 @@ class Truth {
   double time_s() const { return time_s_; }
 
  private:
-  double soc_, rc_v_ = 0, voltage_ = 0, time_s_ = 0;
+  double size_, soc_, rc_v_ = 0, voltage_ = 0, time_s_ = 0;
 };
 
 /// An export with the columns of a Neware tester: no state of charge, 0.1 mV and 1 mA.
 class Export {
  public:
-  Export(const std::filesystem::path& path, double soc) : out_(path), cell_(soc) {
+  Export(const std::filesystem::path& path, double soc, double size) : out_(path), size_(size), cell_(soc, size) {
     out_ << "DataPoint,Step Type,Total Time,Current(A),Voltage(V)\n";
   }
-  void run(double current_a, double duration_s, double step_s) {
+  /// cell_a: of each 100 Ah.
+  void run(double cell_a, double duration_s, double step_s) {
+    const double current_a = size_ * cell_a;
     for (double t = 0; t < duration_s - 1e-6 && inside(current_a); t += step_s) {
       cell_.step(current_a, step_s);
       const auto s = static_cast<long>(std::lround(cell_.time_s()));
@@ -71,19 +75,20 @@ class Export {
     return current_a > 0 ? cell_.soc() < 1 : cell_.soc() > 0;
   }
   std::ofstream out_;
+  double size_;
   Truth cell_;
   int point_ = 0;
 };
 
 /// A slow discharge and charge in one file, a pulse test, and a day in a truck that ends at the returned SOC.
-double write_exports(const std::filesystem::path& folder) {
-  Export slow(folder / "slow.csv", 1);
+double write_exports(const std::filesystem::path& folder, double size = 1) {
+  Export slow(folder / "slow.csv", 1, size);
   slow.run(0, 3'600, 60);
   slow.run(-5, 30 * 3'600, 60);
   slow.run(0, 7'200, 60);
   slow.run(5, 30 * 3'600, 60);
   slow.run(0, 7'200, 60);
-  Export pulses(folder / "hppc.csv", 1);
+  Export pulses(folder / "hppc.csv", 1, size);
   pulses.run(0, 600, 1);
   for (int k = 0; k < 9; ++k) {
     pulses.run(-100, 30, 1);
@@ -93,7 +98,7 @@ double write_exports(const std::filesystem::path& folder) {
     pulses.run(-50, 705, 1);
     pulses.run(0, 1'800, 1);
   }
-  Export truck(folder / "truck.csv", 0.95);
+  Export truck(folder / "truck.csv", 0.95, size);
   truck.run(0, 1'200, 1);
   for (int k = 0; k < 45; ++k) {
     truck.run(-80, 60, 1);
@@ -185,6 +190,27 @@ TEST_F(OwnCell, TheCellIsFoundAndItsEstimatesAreRight) {
   const std::string cell = content(folder_.path() / "my_cell.toml");
   EXPECT_THAT(cell, HasSubstr("discharge_current_max_a = 200"));
   EXPECT_THAT(cell, Not(HasSubstr("charge_current_max_a = 6")));
+}
+
+TEST_F(OwnCell, ACellOf280AhMeetsNoBound) {
+  const double size = 2.8, end_soc = write_exports(folder_.path(), size);
+  const std::string in = folder_.path().string() + "/";
+  const ToolRun run = run_tool("identify --ocv " + in + "slow.csv --recording " + in +
+                               "hppc.csv --initial-soc 1 --voltage-min-v 2.5 --voltage-max-v 3.65 "
+                               "--charge-current-max-a 280 --discharge-current-max-a 560 --json - --out " +
+                               in + "large.toml");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  for (const auto& p : json::parse(run.out)["parameters"]) {
+    EXPECT_FALSE(p["at_bound"]) << p;
+    if (p["name"] == "c1_f") {
+      EXPECT_NEAR(p["value"], size * Truth::c1_f, 0.3 * size * Truth::c1_f);
+    }
+  }
+  const ToolRun replayed =
+      run_tool("replay " + in + "truck.csv --cell " + in + "large.toml --initial-soc 0.95 --json -");
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
+  EXPECT_NEAR(json::parse(replayed.out)["soc"]["final"], end_soc, 0.01);
+  EXPECT_THAT(content(in + "large.toml"), HasSubstr("discharge_current_max_a = 560"));
 }
 
 TEST_F(OwnCell, WithoutASlowTestTheRestsGiveTheOcv) {

@@ -5,6 +5,7 @@
 #include <sys/wait.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -29,6 +30,9 @@ inline std::string content(const std::filesystem::path& path) {
 inline const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
 /// Real recordings, which are not part of the repository; tests that need them skip if they are missing.
 inline const std::filesystem::path data = BMS_DATA_DIR;
+
+/// A slow machine must not add lines of progress to what is compared.
+inline const int progress_is_off = setenv("BMS_PROGRESS", "off", 0);
 
 /// arguments: as typed in a shell.
 inline ToolRun run_tool(const std::string& arguments) {

@@ -353,6 +353,14 @@ TEST(CellFile, FixedPointRefusesResistancesThatItDoesNotHold) {
   EXPECT_THROW(reject_if_fpu_needed(cell(cold + "60000.0\nreference_c = 80.0\n")), BadInput) << "more than 1 ohm";
 }
 
+TEST(CellFile, FixedPointRefusesTheLargestC1) {
+  const auto with_c1 = [](const char* farad) { return replaced(table9_text(), "420.558", farad); };
+  EXPECT_NO_THROW(reject_if_fpu_needed(parse_cell(with_c1("100000.0"), "cell.toml")));
+  EXPECT_THROW(reject_if_fpu_needed(parse_cell(with_c1("100001.0"), "cell.toml")), BadInput);
+  EXPECT_EQ(parse_cell(with_c1("1000000.0"), "cell.toml").parameters.rc.c1_f[0], 1'000'000);
+  EXPECT_THAT(cell_refusal(with_c1("1000001.0")), HasSubstr("expected 100 to 1000000 F"));
+}
+
 TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
   try {
     read_cell("table10");

@@ -1,0 +1,134 @@
+// The current sensor from a log: shifts of the plant (which shares nothing with the model) with errors added to the
+// current that its instruments read.
+#include "workflow/ammeter.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "experiments/experiment.hpp"
+#include "tests/truth/forklift_shift.hpp"
+
+namespace bms::workflow {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct SensorErrors {
+  double offset_a = 0, gain = 0, dead_band_a = 0, largest_a = 1e9;
+
+  double reading(double current_a) const {
+    const double a = std::abs(current_a) < dead_band_a ? 0 : (1 + gain) * current_a + offset_a;
+    return std::clamp(a, -largest_a, largest_a);
+  }
+};
+
+/// Eight hours. The instruments have their own drift (15 mA) and gain error (0.2 %).
+measurement::Recording shift(const SensorErrors& errors, std::uint64_t seed, double capacity_ah = 6,
+                             double step_s = 10) {
+  plant::Cell cell({.capacity_ah = capacity_ah}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 20});
+  plant::Instruments instruments({}, seed);
+  const auto profile =
+      experiments::experiment("forklift_shift", {.capacity_ah = 6, .seed = seed, .step_s = step_s}).value();
+  measurement::Recording r;
+  for (const plant::RecordedRow& row : plant::record(profile, cell, instruments, {.start_c = 20, .end_c = 20})) {
+    r.time_s.edit().push_back(row.time_s);
+    r.current_a.edit().push_back(errors.reading(row.current_a));
+    r.voltage_v.edit().push_back(row.voltage_v);
+    r.temperature_c.edit().push_back(row.temperature_c);
+  }
+  return r;
+}
+
+const files::CellFile& table9() {
+  static const files::CellFile cell = files::read_cell("table9");
+  return cell;
+}
+
+TEST(Ammeter, TheOffsetIsFoundWithinItsUncertainty) {
+  double squares = 0;
+  int count = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    for (const double offset_a : {-0.25, 0.0, 0.08}) {
+      const Ammeter a = examine_ammeter(shift({.offset_a = offset_a}, seed), table9(), {});
+      ASSERT_TRUE(a.offset_a.value) << a.offset_a.why;
+      const double error_a = a.offset_a.value->value - offset_a, std_a = a.offset_a.value->std;
+      EXPECT_LT(std_a, 0.04) << "of use: less than one hundredth of 1C";
+      EXPECT_LT(std::abs(error_a), 3 * std::hypot(std_a, 0.015)) << offset_a << ", seed " << seed;
+      squares += error_a * error_a / (std_a * std_a);
+      ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 1.5) << "the standard deviations hold";
+}
+
+TEST(Ammeter, TheGainNeedsAnIndependentCapacity) {
+  const auto log = shift({.gain = 0.03}, 1);
+  const Ammeter without = examine_ammeter(log, table9(), {});
+  EXPECT_FALSE(without.gain.value);
+  EXPECT_THAT(without.gain.why, HasSubstr("not visible here"));
+  const Ammeter with = examine_ammeter(log, table9(), 0.005);
+  ASSERT_TRUE(with.gain.value) << with.gain.why;
+  EXPECT_NEAR(with.gain.value->value, 0.03, 2.5 * with.gain.value->std);
+  EXPECT_LT(with.gain.value->std, 0.02);
+  // a cell of 3 % more capacity looks the same
+  const Ammeter larger = examine_ammeter(shift({}, 1, 6 / 1.03), table9(), {});
+  EXPECT_FALSE(larger.gain.value);
+}
+
+TEST(Ammeter, AnotherCellIsNotAnOffset) {
+  auto log = shift({}, 1);
+  for (double& v : log.voltage_v.edit()) v += 0.06;
+  const Ammeter a = examine_ammeter(log, table9(), {});
+  EXPECT_FALSE(a.offset_a.value) << a.residual_v.value_or(0);
+  EXPECT_THAT(a.offset_a.why, HasSubstr("does not describe this log"));
+}
+
+TEST(Ammeter, ClippingIsFoundByTheVoltage) {
+  const auto clean = shift({}, 2, 6, 1);
+  const double largest_a = std::abs(*std::min_element(clean.current_a.begin(), clean.current_a.end()));
+  const Ammeter clipped = examine_ammeter(shift({.largest_a = 0.6 * largest_a}, 2, 6, 1), table9(), {});
+  ASSERT_TRUE(clipped.clipping_a.value) << clipped.clipping_a.why;
+  EXPECT_NEAR(clipped.clipping_a.value->value, -0.6 * largest_a, 0.01 * largest_a);
+  EXPECT_LT(clipped.missed_a, 0) << "more discharge than read";
+  EXPECT_FALSE(clipped.offset_a.value) << "the charge beyond is missing";
+  EXPECT_FALSE(examine_ammeter(clean, table9(), {}).clipping_a.value);
+}
+
+/// Ten minutes of slow triangles from -20 to 20 A with a trusted meter.
+measurement::Recording meter_check(const SensorErrors& errors) {
+  measurement::Recording r;
+  for (int k = 0; k < 6'000; ++k) {
+    const double a = 40 * std::abs(std::fmod(k / 1'500.0, 2) - 1) - 20 + 1e-4 * (k % 7);
+    r.time_s.edit().push_back(0.1 * k);
+    r.current_ref_a.edit().push_back(a);
+    r.current_a.edit().push_back(errors.reading(a));
+    r.voltage_v.edit().push_back(3.3);
+  }
+  return r;
+}
+
+TEST(Ammeter, AMeterShowsOffsetAndGain) {
+  const Ammeter a = examine_ammeter(meter_check({.offset_a = -0.3, .gain = 0.02}), table9(), {});
+  EXPECT_TRUE(a.by_reference);
+  EXPECT_NEAR(a.offset_a.value->value, -0.3, 1e-3);
+  EXPECT_NEAR(a.gain.value->value, 0.02, 1e-4);
+  EXPECT_FALSE(a.clipping_a.value);
+  const AmmeterCorrection c = correction_of(a);
+  EXPECT_NEAR(c.of(SensorErrors{.offset_a = -0.3, .gain = 0.02}.reading(12)), 12, 1e-2);
+}
+
+TEST(Ammeter, AMeterShowsDeadBandAndClipping) {
+  const Ammeter a = examine_ammeter(meter_check({.dead_band_a = 0.5, .largest_a = 15}), table9(), {});
+  ASSERT_TRUE(a.dead_band_a.value) << a.dead_band_a.why;
+  EXPECT_NEAR(a.dead_band_a.value->value, 0.5, 4 * a.dead_band_a.value->std + 0.01);
+  ASSERT_TRUE(a.clipping_a.value) << a.clipping_a.why;
+  EXPECT_NEAR(std::abs(a.clipping_a.value->value), 15, 0.01);
+  EXPECT_NEAR(a.gain.value->value, 0, 2e-3) << "clipped readings do not count";
+  EXPECT_FALSE(examine_ammeter(meter_check({}), table9(), {}).dead_band_a.value);
+}
+
+}  // namespace
+}  // namespace bms::workflow
