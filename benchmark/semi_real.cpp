@@ -46,7 +46,8 @@ struct RealSet {
   std::string name, cell, start, chemistry, test;
   double capacity_ah = 0;
   bool held_out = false;  ///< the rules were not developed on this cell
-  bool ocv_from_rests = false;
+  bool ocv_from_rests = false, ocv_from_load = false;
+  std::optional<double> initial_soc;
   std::vector<std::string> calibration, healthy, ocv;
 };
 
@@ -75,6 +76,8 @@ std::vector<RealSet> read_sets(const Options& o) {
     if (t.has("healthy")) s.healthy = t.texts("healthy");
     if (t.has("ocv")) s.ocv = t.texts("ocv");
     if (t.has("ocv_from_rests")) s.ocv_from_rests = t.flag("ocv_from_rests");
+    if (t.has("ocv_from_load")) s.ocv_from_load = t.flag("ocv_from_load");
+    if (t.has("initial_soc")) s.initial_soc = t.number("initial_soc");
     if (t.has("chemistry")) s.chemistry = t.text("chemistry");
     if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
     if (t.has("test")) s.test = t.text("test");
@@ -123,6 +126,8 @@ Prepared prepare(const Options& o, const RealSet& set) {
   options.chemistry = set.chemistry;
   options.capacity_ah = set.capacity_ah;
   options.ocv_from_rests = set.ocv_from_rests;
+  options.ocv_from_load = set.ocv_from_load;
+  if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
   Prepared p;
   const std::filesystem::path half = std::filesystem::temp_directory_path() / "semi_real_calibration.csv";
   if (set.test.empty()) {
