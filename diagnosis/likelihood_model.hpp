@@ -89,6 +89,8 @@ class LikelihoodModel {
 
   /// The fits that follow use the base parameters' derivatives at this point until the noise changes.
   void linearise(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// Returns true if fits that begin now share one; then several may run at once.
+  bool has_linearisation() const { return nearby_ != nullptr; }
   HypothesisFit fit(const Hypothesis& start, int iterations = numerics.fit.iterations) const;
   /// From given base parameters, e.g. those of another fit. Ends early when even a step that gains all it promises
   /// leaves the cost above `hopeless`.
