@@ -44,7 +44,7 @@ class LikelihoodModel {
  public:
   /// own: mechanisms of the cell file. A record with fewer than two rows: std::invalid_argument.
   LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
-                  std::vector<PreparedRecording> records, const NoiseModel& noise);
+                  std::vector<PreparedRecording> records, const NoiseModel& noise, const Loosened& loosened = {});
 
   const model::CellParameters<>& cell() const { return cell_; }
   const std::vector<PreparedRecording>& records() const { return records_; }
