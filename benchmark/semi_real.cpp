@@ -38,6 +38,7 @@ using bms::measurement::Recording;
 struct Options {
   std::string data = "../shared/data", list = "benchmark/semi_real.toml", only, json;
   std::vector<std::string> faults;  ///< empty: all
+  std::vector<double> times_limit;  ///< sizes, in stated detection limits; empty: those of the fault
   double false_alarm_rate = 0.01;
   bool nulls_only = false, without_healthy = false;
 };
@@ -306,6 +307,19 @@ std::string json_of(const std::vector<Result>& results) {
   return list.dump(1) + "\n";
 }
 
+/// Sizes of a fault to put in; none if they are to be multiples of a limit that the healthy recording does not state.
+std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, double capacity_ah,
+                             const std::map<std::string, double>& limits) {
+  if (o.times_limit.empty()) return {fault.size.begin(), fault.size.end()};
+  const auto limit = limits.find(std::string(fault.id));
+  std::vector<double> sizes;
+  for (const double times : o.times_limit) {
+    if (fault.first_parameter != nullptr && limit != limits.end())
+      sizes.push_back(times * limit->second / fault.first_parameter(1, capacity_ah));
+  }
+  return sizes;
+}
+
 void run(const Options& o) {
   std::vector<Result> results;
   const auto add = [&](Result r) {
@@ -328,8 +342,8 @@ void run(const Options& o) {
     add(diagnose(o, set, p, p.test, nullptr, 0, limits));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
-      for (const double size : fault.size) {
-        if (!wanted(fault.id)) continue;
+      if (!wanted(fault.id)) continue;
+      for (const double size : sizes_of(o, fault, p.cell.parameters.capacity_ah, limits)) {
         Recording r = p.test;
         fault.put(r, size, p.cell.parameters.capacity_ah);
         add(diagnose(o, set, p, r, &fault, size, limits));
@@ -353,6 +367,9 @@ int main(int argc, char** argv) {
   app.add_option("--json", o.json, "write every result to FILE")->type_name("FILE");
   app.add_option("--faults", o.faults, "kinds of fault to put in, for example channel_skew; all if not given")
       ->type_name("ID");
+  app.add_option("--times-limit", o.times_limit,
+                 "sizes of the faults, as multiples of the detection limit that the healthy recording states")
+      ->type_name("X");
   app.add_option("--false-alarm-rate", o.false_alarm_rate, "as of bms diagnose")->capture_default_str();
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
