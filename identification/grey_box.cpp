@@ -108,15 +108,18 @@ Limits limits_of(Quantity quantity, const CircuitBounds& b) {
   return {};
 }
 
-/// Branch positions at which the OCV rises everywhere: slow charge and discharge need not be parallel near empty.
+/// Branch positions at which the OCV rises everywhere, and no steeper than a cell file may state: slow charge and
+/// discharge need not be parallel near empty.
 Limits branch_limits(const model::OcvTable<double>& ocv) {
-  constexpr double least_slope_v = 1e-3;  // per unit of soc
+  constexpr double least_slope_v = 1e-3, most_slope_v = 59;  // per unit of soc
   Limits limits = limits_of(Quantity::ocv_branch, {});
   for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
     const double gap_slope_v = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
-    const double room_v = std::max(0.0, ocv.b1_v[k] - least_slope_v);
-    if (gap_slope_v > 0) limits.lower = std::max(limits.lower, ocv.lean - room_v / gap_slope_v);
-    if (gap_slope_v < 0) limits.upper = std::min(limits.upper, ocv.lean - room_v / gap_slope_v);
+    if (gap_slope_v == 0) continue;
+    const double to_least = ocv.lean - std::max(0.0, ocv.b1_v[k] - least_slope_v) / gap_slope_v,
+                 to_most = ocv.lean + std::max(0.0, most_slope_v - ocv.b1_v[k]) / gap_slope_v;
+    limits.lower = std::max(limits.lower, std::min(to_least, to_most));
+    limits.upper = std::min(limits.upper, std::max(to_least, to_most));
   }
   return limits;
 }
