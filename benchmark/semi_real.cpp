@@ -38,6 +38,7 @@ using bms::measurement::Recording;
 struct Options {
   std::string data = "../shared/data", list = "benchmark/semi_real.toml", only, json;
   std::vector<std::string> faults;  ///< empty: all
+  std::vector<double> times_limit;  ///< sizes, in stated detection limits; empty: those of the fault
   double false_alarm_rate = 0.01;
   bool nulls_only = false, without_healthy = false;
 };
@@ -46,7 +47,8 @@ struct RealSet {
   std::string name, cell, start, chemistry, test;
   double capacity_ah = 0;
   bool held_out = false;  ///< the rules were not developed on this cell
-  bool ocv_from_rests = false;
+  bool ocv_from_rests = false, ocv_from_load = false;
+  std::optional<double> initial_soc;
   std::vector<std::string> calibration, healthy, ocv;
 };
 
@@ -75,6 +77,8 @@ std::vector<RealSet> read_sets(const Options& o) {
     if (t.has("healthy")) s.healthy = t.texts("healthy");
     if (t.has("ocv")) s.ocv = t.texts("ocv");
     if (t.has("ocv_from_rests")) s.ocv_from_rests = t.flag("ocv_from_rests");
+    if (t.has("ocv_from_load")) s.ocv_from_load = t.flag("ocv_from_load");
+    if (t.has("initial_soc")) s.initial_soc = t.number("initial_soc");
     if (t.has("chemistry")) s.chemistry = t.text("chemistry");
     if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
     if (t.has("test")) s.test = t.text("test");
@@ -123,6 +127,8 @@ Prepared prepare(const Options& o, const RealSet& set) {
   options.chemistry = set.chemistry;
   options.capacity_ah = set.capacity_ah;
   options.ocv_from_rests = set.ocv_from_rests;
+  options.ocv_from_load = set.ocv_from_load;
+  if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
   Prepared p;
   const std::filesystem::path half = std::filesystem::temp_directory_path() / "semi_real_calibration.csv";
   if (set.test.empty()) {
@@ -301,6 +307,19 @@ std::string json_of(const std::vector<Result>& results) {
   return list.dump(1) + "\n";
 }
 
+/// Sizes of a fault to put in; none if they are to be multiples of a limit that the healthy recording does not state.
+std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, double capacity_ah,
+                             const std::map<std::string, double>& limits) {
+  if (o.times_limit.empty()) return {fault.size.begin(), fault.size.end()};
+  const auto limit = limits.find(std::string(fault.id));
+  std::vector<double> sizes;
+  for (const double times : o.times_limit) {
+    if (fault.first_parameter != nullptr && limit != limits.end())
+      sizes.push_back(times * limit->second / fault.first_parameter(1, capacity_ah));
+  }
+  return sizes;
+}
+
 void run(const Options& o) {
   std::vector<Result> results;
   const auto add = [&](Result r) {
@@ -323,8 +342,8 @@ void run(const Options& o) {
     add(diagnose(o, set, p, p.test, nullptr, 0, limits));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
-      for (const double size : fault.size) {
-        if (!wanted(fault.id)) continue;
+      if (!wanted(fault.id)) continue;
+      for (const double size : sizes_of(o, fault, p.cell.parameters.capacity_ah, limits)) {
         Recording r = p.test;
         fault.put(r, size, p.cell.parameters.capacity_ah);
         add(diagnose(o, set, p, r, &fault, size, limits));
@@ -348,6 +367,9 @@ int main(int argc, char** argv) {
   app.add_option("--json", o.json, "write every result to FILE")->type_name("FILE");
   app.add_option("--faults", o.faults, "kinds of fault to put in, for example channel_skew; all if not given")
       ->type_name("ID");
+  app.add_option("--times-limit", o.times_limit,
+                 "sizes of the faults, as multiples of the detection limit that the healthy recording states")
+      ->type_name("X");
   app.add_option("--false-alarm-rate", o.false_alarm_rate, "as of bms diagnose")->capture_default_str();
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");

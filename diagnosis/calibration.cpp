@@ -140,11 +140,16 @@ void Calibration::add_record(const model::CellParameters<>& cell, const Prepared
   offset_.push_back(hat_functions(std::move(at), [&](double) { return offset_a_; }));
 }
 
-Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch)
+Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch,
+                         const Loosened& loosened)
     : offset_a_(std::min(cell.noise.current_offset_a, calibration_limits.offset_at_most_c * cell.capacity_ah)) {
   const SocRange range = counted_range(cell, records);
   add_ocv(cell, range);
   add_resistances(cell, range);
+  ocv_.loosen(loosened.ocv);
+  r0_.loosen(loosened.r0);
+  r1_.loosen(loosened.rc);
+  c1_.loosen(loosened.rc);
   capacity_ = size_++;
   gain_ = size_++;
   for (const PreparedRecording& r : records) {

@@ -42,6 +42,9 @@ class HatFunctions {
     for (const double x : knots_) sigma_.push_back(sigma(x));
   }
   std::size_t size() const { return knots_.size(); }
+  void loosen(double times) {
+    for (double& s : sigma_) s *= times;
+  }
   const std::vector<double>& knots() const { return knots_; }
 
   /// Value at x, u: all unknowns in standard deviations. X, U: double or a dual number.
@@ -87,6 +90,11 @@ struct Lever {
   enum : std::size_t { ocv, r0, r1, c1, share, zero, capacity, gain, count };
 };
 
+/// Factors on the standard deviations of a law's tables.
+struct Loosened {
+  double ocv = 1, r0 = 1, rc = 1;
+};
+
 class Calibration {
  public:
   struct Unchanged {
@@ -97,7 +105,8 @@ class Calibration {
   };
 
   /// records: one at least, none empty. branch: each recording has a branch position of its own.
-  Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch = false);
+  Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch = false,
+              const Loosened& loosened = {});
 
   /// Number of unknowns: the OCV's first, those of single recordings last.
   std::size_t size() const { return size_; }

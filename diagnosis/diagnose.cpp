@@ -152,6 +152,13 @@ void add_location(const LikelihoodModel& likelihood, const HypothesisFit& best, 
   d.unexplained_share = 0;
 }
 
+/// Where an unknown cause sits, and the cell with a term for it.
+void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, Diagnosis& d) {
+  if (d.verdict != Verdict::unknown || d.interrupted) return;
+  d.law = learn_law_term(likelihood, nominal, d.remaining_goes_with);
+  if (d.law && d.law->cell) d.cell = *d.law->cell;
+}
+
 /// The extended cell: mechanisms found, and base parameters where they fit together with them.
 void add_extended_cell(const LikelihoodModel& likelihood, const HypothesisFit& best, Diagnosis& d) {
   d.extended = best.hypothesis;
@@ -249,6 +256,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   add_numbers(adequacy, search.nominal_noise(), d);
   add_location(likelihood, survivors.best, contributed, adequacy, d);
   add_extended_cell(likelihood, survivors.best, d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
   if (options.progress) options.progress(1, "done");
   return d;

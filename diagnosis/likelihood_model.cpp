@@ -26,13 +26,14 @@ bool has_own_branch(const std::vector<MechanismSetting>& own, const std::vector<
 }  // namespace
 
 LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
-                                 std::vector<PreparedRecording> records, const NoiseModel& noise)
+                                 std::vector<PreparedRecording> records, const NoiseModel& noise,
+                                 const Loosened& loosened)
     : cell_(cell),
       tables_(model::prepare<double, model::max_intervals>(cell)),
       own_(std::move(own)),
       records_(std::move(records)),
       facts_(recording_facts(cell, records_)),
-      calibration_(cell, records_, has_own_branch(own_, records_)) {
+      calibration_(cell, records_, has_own_branch(own_, records_), loosened) {
   for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording with fewer than two rows");
     samples_ += r.size();

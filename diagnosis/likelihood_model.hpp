@@ -44,7 +44,7 @@ class LikelihoodModel {
  public:
   /// own: mechanisms of the cell file. A record with fewer than two rows: std::invalid_argument.
   LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
-                  std::vector<PreparedRecording> records, const NoiseModel& noise);
+                  std::vector<PreparedRecording> records, const NoiseModel& noise, const Loosened& loosened = {});
 
   const model::CellParameters<>& cell() const { return cell_; }
   const std::vector<PreparedRecording>& records() const { return records_; }
@@ -89,6 +89,8 @@ class LikelihoodModel {
 
   /// The fits that follow use the base parameters' derivatives at this point until the noise changes.
   void linearise(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// Returns true if fits that begin now share one; then several may run at once.
+  bool has_linearisation() const { return nearby_ != nullptr; }
   HypothesisFit fit(const Hypothesis& start, int iterations = numerics.fit.iterations) const;
   /// From given base parameters, e.g. those of another fit. Ends early when even a step that gains all it promises
   /// leaves the cost above `hopeless`.

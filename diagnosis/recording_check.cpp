@@ -237,11 +237,35 @@ void check_gaps(Record& r, const Cell& cell, RecordingCheck& found) {
 }
 
 /// At edges of the current the voltage must follow.
+/// Returns true if the voltage falls while the same current charges, or rises while it discharges: a discharge at
+/// constant current has too few steps to see the sign by.
+bool moves_against_charge(const Record& r, const Cell& cell) {
+  const double loaded_a = fault_limits.edge_c * cell.capacity_ah;
+  std::size_t first = r.size(), last = 0;
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    if (!(std::abs(r.current_a[k]) > loaded_a) || !std::isfinite(r.voltage_v[k])) continue;
+    first = std::min(first, k);
+    last = k;
+  }
+  if (first >= last) return false;
+  double moved_soc = 0;
+  for (std::size_t k = first + 1; k <= last; ++k) {
+    const double a = r.current_a[k];
+    if (!(a * r.current_a[first] > 0) || std::abs(a / r.current_a[first] - 1) > fault_limits.same_current) return false;
+    moved_soc += a * (r.time_s[k] - r.time_s[k - 1]) / (3'600 * cell.capacity_ah);
+  }
+  const double moved_v = r.voltage_v[last] - r.voltage_v[first];
+  return std::abs(moved_soc) > fault_limits.inverted_soc && moved_v * moved_soc < 0 &&
+         std::abs(moved_v) > fault_limits.inverted_v;
+}
+
 void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
   const measurement::StepCorrelation edges =
       measurement::step_correlation(r.current_a, r.voltage_v, fault_limits.edge_c * cell.capacity_ah);
-  if (edges.steps >= fault_limits.edges_for_sign && edges.product < fault_limits.inverted_correlation * edges.limit &&
-      edges.opposed > edges.steps * fault_limits.inverted_edges / fault_limits.inverted_of) {
+  const bool by_edges = edges.steps >= fault_limits.edges_for_sign &&
+                        edges.product < fault_limits.inverted_correlation * edges.limit &&
+                        edges.opposed > edges.steps * fault_limits.inverted_edges / fault_limits.inverted_of;
+  if (by_edges || moves_against_charge(r, cell)) {
     found.faults.push_back(
         {"current_inverted",
          "The voltage falls where the current rises, so the sign of the current is inverted. Charging "

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -69,6 +70,19 @@ bool alike(const NoiseModel& a, const NoiseModel& b) {
   return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
 }
 
+/// Fitted again with the noise model that its own residual makes most probable.
+HypothesisFit own_noise_fit(LikelihoodModel& likelihood, const NoiseModel& nominal, HypothesisFit f) {
+  for (int round = 0; round < search_numerics.noise_rounds; ++round) {
+    double cost = 0;
+    const NoiseModel noise =
+        likelihood.likeliest_noise(likelihood.raw_residual(f.hypothesis, f.calibration), nominal, cost);
+    if (noise == f.noise) break;
+    likelihood.set_noise(noise);
+    f = likelihood.fit(f.hypothesis, f.calibration, numerics.fit.refit_iterations);
+  }
+  return f;
+}
+
 double& onset_of(Hypothesis& h) {
   return std::find_if(
              h.settings.begin(), h.settings.end(),
@@ -94,17 +108,7 @@ double Search::score(const HypothesisFit& f) {
   return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
 }
 
-HypothesisFit Search::with_own_noise(HypothesisFit f) {
-  for (int round = 0; round < search_numerics.noise_rounds; ++round) {
-    double cost = 0;
-    const NoiseModel noise =
-        likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
-    if (noise == f.noise) break;
-    likelihood_.set_noise(noise);
-    f = likelihood_.fit(f.hypothesis, f.calibration, numerics.fit.refit_iterations);
-  }
-  return f;
-}
+HypothesisFit Search::with_own_noise(HypothesisFit f) { return own_noise_fit(likelihood_, nominal_, std::move(f)); }
 
 double Search::gain(const HypothesisFit& less, const HypothesisFit& more) {
   const RecordingFacts& facts = likelihood_.facts();
@@ -131,7 +135,7 @@ std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) co
   return {around.calibration, likelihood_.unchanged()};
 }
 
-std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) {
+std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) const {
   MechanismSetting& s = h.settings.back();
   const std::vector<std::vector<double>> starts = knowledge_of(s.index).far_starts(s, likelihood_.facts());
   if (starts.empty()) return std::nullopt;
@@ -157,7 +161,7 @@ bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
   return false;
 }
 
-HypothesisFit Search::refined_onset(HypothesisFit best) {
+HypothesisFit Search::refined_onset(HypothesisFit best) const {
   const PreparedRecording& r = likelihood_.records().front();
   const double margin_s = search_numerics.onset_margin * r.duration_s(),
                least_s = search_numerics.onset_rows * r.duration_s() / static_cast<double>(r.size());
@@ -227,17 +231,26 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
                                           double hopeless) {
-  std::vector<HypothesisFit> fits;
-  if (!around.hypothesis.added().empty()) likelihood_.linearise(around.hypothesis, around.calibration);
-  for (const Candidate& c : candidates) {
-    if (stopped()) break;
-    fits.push_back(fit_with(around, c, hopeless));
-  }
+  std::vector<HypothesisFit> fits(candidates.size());
+  // the fits share a linearisation, as several run at once
+  if (!around.hypothesis.added().empty())
+    likelihood_.linearise(around.hypothesis, around.calibration);
+  else if (!likelihood_.has_linearisation())
+    likelihood_.linearise(likelihood_.base(), likelihood_.unchanged());
+  measurement::in_parallel(candidates.size(), [&](std::size_t k) {
+    if (!stopped()) fits[k] = fit_with(around, candidates[k], hopeless);
+  });
+  std::erase_if(fits, [](const HypothesisFit& f) { return f.residual.size() == 0; });
   std::stable_sort(fits.begin(), fits.end(),
                    [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
-  for (std::size_t k = 0; k < fits.size() && k < search_numerics.fits_with_own_noise; ++k) {
-    if (fits[k].cost < hopeless) fits[k] = with_own_noise(fits[k]);
-  }
+  std::size_t foremost = 0;
+  while (foremost < std::min(fits.size(), search_numerics.fits_with_own_noise) && fits[foremost].cost < hopeless)
+    ++foremost;
+  measurement::in_parallel(foremost, [&](std::size_t k) {
+    LikelihoodModel own = likelihood_;
+    fits[k] = own_noise_fit(own, nominal_, std::move(fits[k]));
+  });
+  if (foremost > 0) likelihood_.set_noise(fits[foremost - 1].noise);
   return fits;
 }
 
@@ -254,6 +267,7 @@ HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism)
 }
 
 void Search::report(std::string_view what) {
+  const std::lock_guard one_at_a_time(reporting_);
   ++steps_;
   if (progress_)
     progress_(1 - std::exp(-static_cast<double>(steps_) / search_numerics.progress_steps), std::string(what));

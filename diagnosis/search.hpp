@@ -4,6 +4,7 @@
 #include <array>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -71,17 +72,17 @@ class Search {
  private:
   /// -2 log posterior with the noise model that the residual makes most probable, at its price.
   double total(const HypothesisFit& f) const;
-  /// A candidate added to what is there, fitted from its estimate and from far starts.
+  /// A candidate added to what is there, fitted from its estimate and from far starts. Called from several threads.
   HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
   /// The best of some strengths far from the signature's estimate; nothing if none is better than it.
-  std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u);
+  std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u) const;
   /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
   /// a mechanism is missing.
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;
   /// Returns true if a far start is better where the signature, which is linear, sees nothing.
   bool far_better(const HypothesisFit& around, const Candidate& c);
   /// The moment at which a contact has changed, to the row.
-  HypothesisFit refined_onset(HypothesisFit best);
+  HypothesisFit refined_onset(HypothesisFit best) const;
   /// The candidates fitted, by cost; the foremost with the noise that they leave, which is smaller if much is
   /// explained.
   std::vector<HypothesisFit> fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
@@ -92,6 +93,7 @@ class Search {
   const Stopped& stopped_;
   NoiseModel nominal_;
   std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
+  std::mutex reporting_;
   int steps_ = 0;
 };
 

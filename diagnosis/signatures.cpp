@@ -4,6 +4,7 @@
 
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -12,26 +13,38 @@ namespace {
 using model::catalogue;
 using model::Role;
 
+/// One setting of a mechanism, and the derivatives by those of its parameters that are probed.
+struct Derivatives {
+  Probe probe;
+  Columns columns;
+};
+
+Derivatives derivatives_of(const LikelihoodModel& likelihood, const HypothesisFit& around,
+                           const MechanismSetting& setting) {
+  const model::MechanismInfo& info = catalogue[setting.index];
+  const Hypothesis probe = with(around.hypothesis, setting);
+  Derivatives d{{setting, {}, 0}, {}};
+  std::vector<ParameterRef> by;
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const Role role = info.parameter[k].role;
+    if (role != Role::strength && !(role == Role::place && knowledge_of(setting.index).probes_places)) continue;
+    d.probe.parameters.push_back(k);
+    by.push_back({probe.settings.size() - 1, k});
+  }
+  d.columns = likelihood.derivatives(probe, around.calibration, by);
+  return d;
+}
+
 /// Collects probes and their columns.
 class Collector {
  public:
-  Collector(const LikelihoodModel& likelihood, const HypothesisFit& around)
-      : likelihood_(likelihood), around_(around) {}
+  explicit Collector(const LikelihoodModel& likelihood) : likelihood_(likelihood) {}
 
-  void add_derivatives(std::size_t mechanism) {
-    const model::MechanismInfo& info = catalogue[mechanism];
-    for (const MechanismSetting& setting : probe_settings(likelihood_, mechanism)) {
-      const Hypothesis probe = with(around_.hypothesis, setting);
-      Probe p{setting, {}, count_};
-      std::vector<ParameterRef> by;
-      for (std::size_t k = 0; k < info.parameters; ++k) {
-        const Role role = info.parameter[k].role;
-        if (role != Role::strength && !(role == Role::place && knowledge_of(mechanism).probes_places)) continue;
-        p.parameters.push_back(k);
-        by.push_back({probe.settings.size() - 1, k});
-      }
-      add(std::move(p), likelihood_.derivatives(probe, around_.calibration, by));
-    }
+  void add(Derivatives d) {
+    d.probe.first = count_;
+    count_ += d.columns.cols();
+    probes_.push_back(std::move(d.probe));
+    blocks_.push_back(std::move(d.columns));
   }
 
   /// A resistance from a moment on: the current after it, one column per moment of the first recording. Later
@@ -71,14 +84,7 @@ class Collector {
   }
 
  private:
-  void add(Probe probe, Columns block) {
-    count_ += block.cols();
-    probes_.push_back(std::move(probe));
-    blocks_.push_back(std::move(block));
-  }
-
   const LikelihoodModel& likelihood_;
-  const HypothesisFit& around_;
   std::vector<Probe> probes_;
   std::vector<Columns> blocks_;
   Eigen::Index count_ = 0;
@@ -114,17 +120,23 @@ bool is_searched(std::size_t mechanism, double capacity_ah) {
 
 SignatureSet signatures(const LikelihoodModel& likelihood, const HypothesisFit& around,
                         const std::vector<std::size_t>& over) {
-  const Hypothesis& h = around.hypothesis;
-  Collector collector(likelihood, around);
-  for (const Signature kind : {Signature::derivatives, Signature::contact_change}) {
-    for (const std::size_t mechanism : over) {
-      if (knowledge_of(mechanism).signature != kind) continue;
-      if (h.find(mechanism) != nullptr || not_testable(likelihood, h, mechanism)) continue;
-      if (kind == Signature::derivatives)
-        collector.add_derivatives(mechanism);
-      else
-        collector.add_contact_change(mechanism);
-    }
+  const auto probed = [&](std::size_t mechanism, Signature kind) {
+    return knowledge_of(mechanism).signature == kind && around.hypothesis.find(mechanism) == nullptr &&
+           !not_testable(likelihood, around.hypothesis, mechanism);
+  };
+  std::vector<MechanismSetting> settings;
+  for (const std::size_t mechanism : over) {
+    if (!probed(mechanism, Signature::derivatives)) continue;
+    const std::vector<MechanismSetting> of = probe_settings(likelihood, mechanism);
+    settings.insert(settings.end(), of.begin(), of.end());
+  }
+  std::vector<Derivatives> derivatives(settings.size());
+  measurement::in_parallel(settings.size(),
+                           [&](std::size_t k) { derivatives[k] = derivatives_of(likelihood, around, settings[k]); });
+  Collector collector(likelihood);
+  for (Derivatives& d : derivatives) collector.add(std::move(d));
+  for (const std::size_t mechanism : over) {
+    if (probed(mechanism, Signature::contact_change)) collector.add_contact_change(mechanism);
   }
   return std::move(collector).collected();
 }

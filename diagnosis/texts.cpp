@@ -160,6 +160,14 @@ std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {
       fmt::format("The recording differs from the model by {} in a way that none of the known causes explains.",
                   millivolts(facts.error_v));
   if (!where.empty()) text += " Most of the difference lies " + where + ".";
+  if (d.law) {
+    text += fmt::format(" It acts on {}.", name_of_law(*d.law));
+    if (d.law->cell)
+      return text + fmt::format(
+                        " A term learned for it reduces the error on parts of the recordings that were left out from "
+                        "{} to {}; the extended cell file has it. Check it on another recording with --holdout.",
+                        millivolts(d.law->left_out_before_v), millivolts(d.law->left_out_after_v));
+  }
   if (!d.candidates.empty()) {
     const Ranked& nearest = d.candidates.front();
     if (nearest.ids.size() == 1 && nearest.explained_share >= text_style.nearest_explains)

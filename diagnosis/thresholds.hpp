@@ -53,6 +53,8 @@ struct Thresholds {
     double inverted_correlation = -0.5;  ///< of current and voltage steps
     std::size_t inverted_edges = 7;      ///< more than so many of
     std::size_t inverted_of = 10;        ///< so many steps go the wrong way
+    double same_current = 0.1;           ///< by which a constant current may differ,
+    double inverted_soc = 0.2, inverted_v = 0.15;  ///< [soc, V] that it moves, the voltage the wrong way: no OCV does
   };
 
   /// Noise that exists before any hypothesis.
@@ -314,6 +316,13 @@ struct Thresholds {
     std::array<double, 7> factors = {1, 1.5, 2, 3, 4, 6, 8};
   };
 
+  /// A term for what no known cause explains (law_term.hpp).
+  struct LawTerms {
+    std::size_t folds = 3, blocks = 24;                  ///< of each recording: every third block is left out in turn
+    std::array<double, 3> times_tolerance = {20, 8, 3};  ///< of the law's tables; laws are compared at the first
+    double error_left = 0.8;  ///< share of the error on what was left out, below which a law is named by its term
+  };
+
   RecordingFaults recording;
   Noise noise;
   Priors priors;
@@ -334,6 +343,7 @@ struct Thresholds {
   Design design;
   Healthy healthy;
   ModelTolerance model_tolerance;
+  LawTerms law_terms;
 };
 
 inline constexpr Thresholds thresholds{};

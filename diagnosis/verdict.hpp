@@ -11,6 +11,7 @@
 
 #include "diagnosis/healthy_null.hpp"
 #include "diagnosis/hypothesis.hpp"
+#include "diagnosis/law_term.hpp"
 #include "diagnosis/noise.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "model/cell_parameters.hpp"
@@ -123,9 +124,10 @@ struct Diagnosis {
   double unknown_gain = 0;              ///< that something else is there, before anything was withheld
   std::optional<HealthyBasis> healthy;  ///< nothing: the cell file has no healthy data
   std::vector<Withheld> withheld;       ///< the largest gain first
+  std::optional<LawTerm> law;           ///< of an unknown cause
   Hypothesis extended;                  ///< the cell's own mechanisms and those found
   model::CellParameters<> cell;      ///< base parameters moved, within their tolerance, to where they fit together with
-                                     ///< the findings; as given without findings
+                                     ///< the findings, or with the term of an unknown cause; else as given
   Eigen::MatrixXd covariance;        ///< of the estimated parameters of `extended`
   NoiseModel noise;                  ///< nominal
   std::vector<RecordingView> views;  ///< by record

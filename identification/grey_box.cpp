@@ -108,6 +108,26 @@ Limits limits_of(Quantity quantity, const CircuitBounds& b) {
   return {};
 }
 
+/// Branch positions at which the OCV rises everywhere, and no steeper than a cell file may state: slow charge and
+/// discharge need not be parallel near empty.
+Limits branch_limits(const model::OcvTable<double>& ocv) {
+  constexpr double least_slope_v = 1e-3, most_slope_v = 59;  // per unit of soc
+  Limits limits = limits_of(Quantity::ocv_branch, {});
+  for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
+    const double gap_slope_v = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
+    if (gap_slope_v == 0) continue;
+    const double to_least = ocv.lean - std::max(0.0, ocv.b1_v[k] - least_slope_v) / gap_slope_v,
+                 to_most = ocv.lean + std::max(0.0, most_slope_v - ocv.b1_v[k]) / gap_slope_v;
+    limits.lower = std::max(limits.lower, std::min(to_least, to_most));
+    limits.upper = std::min(limits.upper, std::max(to_least, to_most));
+  }
+  return limits;
+}
+
+Limits limits_within(Quantity quantity, const model::CellParameters<>& cell, const CircuitBounds& b) {
+  return quantity == Quantity::ocv_branch ? branch_limits(cell.ocv) : limits_of(quantity, b);
+}
+
 }  // namespace
 
 const char* Unknown::name() const {
@@ -194,7 +214,7 @@ Eigen::VectorXd GreyBox::start() const {
   Eigen::VectorXd x(static_cast<Eigen::Index>(unknowns_.size()));
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Unknown& u = unknowns_[static_cast<std::size_t>(k)];
-    const Limits limits = limits_of(u.quantity, options_.bounds);
+    const Limits limits = limits_within(u.quantity, cell_, options_.bounds);
     x[k] = std::clamp(value_of(u), limits.lower, limits.upper);
   }
   return x;
@@ -287,7 +307,7 @@ LeastSquares GreyBox::problem() const {
   p.upper.resize(n);
   p.scale.resize(n);
   for (Eigen::Index k = 0; k < n; ++k) {
-    const Limits limits = limits_of(unknowns_[static_cast<std::size_t>(k)].quantity, options_.bounds);
+    const Limits limits = limits_within(unknowns_[static_cast<std::size_t>(k)].quantity, cell_, options_.bounds);
     p.lower[k] = limits.lower;
     p.upper[k] = limits.upper;
     p.scale[k] = limits.scale;

@@ -1,15 +1,14 @@
 #include "identification/joint_fit.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <thread>
 
 #include <ceres/jet.h>
 
 #include "identification/uncertainty.hpp"
+#include "measurement/in_parallel.hpp"
 #include "model/corrected_readings.hpp"
 
 namespace bms::identification {
@@ -167,7 +166,7 @@ class JointProblem {
     const Index rows = data_rows() + static_cast<Index>(priors.size());
     residuals.setZero(rows);
     if (jacobian != nullptr) jacobian->setZero(rows, unknowns());
-    in_parallel(recordings_.size(), [&](std::size_t r) {
+    measurement::in_parallel(recordings_.size(), [&](std::size_t r) {
       if (jacobian == nullptr)
         residuals_of(x, r, residuals);
       else
@@ -293,7 +292,7 @@ JointFit fit_joint(const JointModel& model, std::span<const JointRecording> reco
   if (options.uncertainty) add_uncertainty(model, problem, fit);
   const JointModel found = with_values(model, fit.value);
   fit.rmse_v.resize(recordings.size());
-  in_parallel(recordings.size(), [&](std::size_t r) {
+  measurement::in_parallel(recordings.size(), [&](std::size_t r) {
     fit.rmse_v[r] = rmse_v(recordings[r].data, simulate(found, recordings[r], fit.states[r]).voltage_v);
   });
   return fit;

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -103,8 +102,5 @@ double rmse_v(const Data& measured, std::span<const double> simulated_v);
 
 /// The constant current [A] that, added to the current, makes the counted charge follow the reference best.
 double current_correction_a(const Data& data, std::span<const double> soc_ref, double initial_soc);
-
-/// Runs work(k) for k = 0 .. count - 1 in as many threads as there are processors.
-void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work);
 
 }  // namespace bms::identification

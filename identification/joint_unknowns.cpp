@@ -1,10 +1,8 @@
 // The parts of the joint fit that are not the fit: its unknowns, and small sums over recordings.
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
-#include <thread>
 
 #include "identification/joint_fit.hpp"
 
@@ -21,18 +19,6 @@ std::size_t place_of(const JointModel& m, std::size_t mechanism) {
     if (m.mechanisms[k].index == mechanism) return k;
   }
   throw std::invalid_argument("joint fit: the mechanism of an unknown is missing");
-}
-
-void in_parallel(std::size_t count, const std::function<void(std::size_t)>& work) {
-  const std::size_t threads = std::min<std::size_t>(count, std::max(1U, std::thread::hardware_concurrency()));
-  std::atomic<std::size_t> next = 0;
-  const auto take = [&] {
-    for (std::size_t k = next++; k < count; k = next++) work(k);
-  };
-  std::vector<std::thread> others;
-  for (std::size_t k = 1; k < threads; ++k) others.emplace_back(take);
-  take();
-  for (std::thread& t : others) t.join();
 }
 
 std::string JointUnknown::name() const {

@@ -180,6 +180,11 @@ std::string json_of(const workflow::DiagnoseResult& r) {
       r.soc ? Json{{"baseline_rmse", r.soc->baseline_rmse}, {"extended_rmse", r.soc->extended_rmse}} : Json(nullptr);
   json["noise_floor_v"] = number(d.noise_floor_v);
   json["unexplained"] = {{"rmse_v", number(d.unexplained_rmse_v)}, {"share", number(d.unexplained_share)}};
+  json["law"] = d.law ? Json(d.law->law) : Json(nullptr);
+  json["depends_on"] = d.law ? Json(d.law->depends_on) : Json::array();
+  json["left_out"] = d.law && d.law->cell ? Json{{"before_rmse_v", number(d.law->left_out_before_v)},
+                                                 {"after_rmse_v", number(d.law->left_out_after_v)}}
+                                          : Json(nullptr);
   json["detection_limits"] = limits_of(d);
   json["estimates"] = estimates_of(d);
   json["not_testable"] = Json::array();

@@ -220,6 +220,10 @@ class IdentifyCommand final : public Command {
         ->check(Within(0.01, 1000.0));
     c.add_flag("--ocv-from-rests", o_.ocv_from_rests,
                "take the OCV from the rests of the recordings (ten minutes or more; a pulse test) instead of --ocv");
+    c.add_flag("--ocv-from-load", o_.ocv_from_load,
+               "take the OCV from discharges under load: the voltage plus the drop over the resistance that the steps "
+               "of the current show; needs --initial-soc or soc_ref")
+        ->excludes("--ocv-from-rests");
     add_limits(c);
   }
 

@@ -197,12 +197,12 @@ void add_next_experiment(DiagnoseResult& r) {
 }
 
 void add_holdout_warnings(DiagnoseResult& r) {
-  if (!r.named()) return;
+  if (!r.named() && !r.has_term()) return;
   if (r.baseline_holdout && r.extended_holdout &&
       r.extended_holdout->rmse_v > significant_increase * r.baseline_holdout->rmse_v) {
     r.warnings.push_back(
-        {"holdout_worse", fmt::format("with the findings the error on the hold-out recordings increases from {:.1f} mV "
-                                      "to {:.1f} mV: do not rely on them",
+        {"holdout_worse", fmt::format("with the extended cell file the error on the hold-out recordings increases from "
+                                      "{:.1f} mV to {:.1f} mV: do not rely on it",
                                       1e3 * r.baseline_holdout->rmse_v, 1e3 * r.extended_holdout->rmse_v)});
   }
   if (r.soc && r.soc->extended_rmse > significant_increase * r.soc->baseline_rmse) {

@@ -140,6 +140,15 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
   files::CellFile cell = r.cell;
   std::string files;
   for (const RecordingComparison& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
+  if (r.has_term()) {
+    if (!cell.name.ends_with("_extended")) cell.name += "_extended";
+    cell.parameters = with_short_numbers(r.diagnosis.cell);
+    const std::string source = fmt::format("; with a term for an unknown cause in {} (bms diagnose of {})",
+                                           diagnosis::name_of_law(*r.diagnosis.law), files);
+    for (const char* table : {"ocv", "rc"}) cell.sources[table] += source;
+    cell.source += source;
+    return cell;
+  }
   if (!r.named()) {
     cell.source += fmt::format("; bms diagnose of {}: {}, nothing was added", files, name_of(r.diagnosis.verdict));
     return cell;

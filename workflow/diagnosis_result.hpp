@@ -42,6 +42,8 @@ struct DiagnoseResult {
 
   /// Returns true if the verdict names mechanisms; they are then in the extended cell.
   bool named() const { return diagnosis::names(diagnosis.verdict); }
+  /// Returns true if the extended cell has a term for an unknown cause.
+  bool has_term() const { return diagnosis.law && diagnosis.law->cell; }
 };
 
 }  // namespace bms::workflow

@@ -49,6 +49,7 @@ struct IdentifyOptions {
   std::optional<double> reference_temperature_c;  ///< of the cell file; not given: that of `start`
   double capacity_ah = 0;                         ///< 0: of the OCV recordings, else of `start`
   bool ocv_from_rests = false;                    ///< OCV from the rests of `recordings`
+  bool ocv_from_load = false;                     ///< OCV from discharges under load
   std::string chemistry;                          ///< "LFP", "NMC", "NCA", "LTO"; empty: by the voltages
   StatedLimits limits;                            ///< what is not given is derived, if `start` is another cell
   std::string name;                               ///< of the cell

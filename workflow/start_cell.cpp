@@ -8,6 +8,7 @@
 
 #include "files/bad_input.hpp"
 #include "measurement/recording_checks.hpp"
+#include "workflow/loaded_ocv.hpp"
 #include "workflow/rest_ocv.hpp"
 
 namespace bms::workflow {
@@ -31,13 +32,39 @@ void derive(const IdentifyOptions& options, const std::vector<measurement::Recor
                    l.voltage_max_v, l.charge_current_max_a, l.discharge_current_max_a, start.limits_source)});
 }
 
+/// State of charge at the start of a recording. option: that asks for it.
+double first_soc(const IdentifyOptions& options, const measurement::Recording& r, const char* option) {
+  if (options.initial_soc.value) return *options.initial_soc.value;
+  if (r.soc_ref.empty()) throw files::BadInput(option, 1, "no state of charge at the start, expected --initial-soc");
+  return r.soc_ref.front();
+}
+
+void take_ocv_from_load(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings,
+                        StartCell& start, std::vector<measurement::Warning>& warnings) {
+  std::vector<LoadedRecording> loaded;
+  for (const measurement::Recording& r : recordings) loaded.push_back({&r, first_soc(options, r, "--ocv-from-load")});
+  try {
+    const LoadedOcv ocv = take_ocv_from_load(loaded, start.cell);
+    const std::string source = fmt::format(
+        "voltages under load from {:.0f} to {:.0f} % plus the drop over {:.3g} ohm, the median of {} steps of the "
+        "current; good to {:.0f} mV",
+        100 * ocv.soc_min, 100 * ocv.soc_max, ocv.resistance_ohm, ocv.steps, 1e3 * ocv.error_v);
+    start.cell.sources["ocv"] = source;
+    start.ocv_error_v = ocv.error_v;
+    model::CellParameters<>& p = start.cell.parameters;
+    p.tolerance.ocv_v = std::clamp(ocv.error_v, 0.0005, 0.1);
+    p.noise.rest_v = std::clamp(ocv.error_v, p.noise.rest_v, 0.5);
+    warnings.push_back({"ocv_from_load", "OCV from " + source});
+  } catch (const std::invalid_argument& error) {
+    throw files::BadInput(options.recordings.front(), 1, error.what());
+  }
+}
+
 void take_ocv_from_rests(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings,
                          StartCell& start, std::vector<measurement::Warning>& warnings) {
   std::vector<RestedPoint> points;
   for (const measurement::Recording& r : recordings) {
-    if (!options.initial_soc.value && r.soc_ref.empty())
-      throw files::BadInput("--ocv-from-rests", 1, "no state of charge at the start, expected --initial-soc");
-    const double first = options.initial_soc.value ? *options.initial_soc.value : r.soc_ref.front();
+    const double first = first_soc(options, r, "--ocv-from-rests");
     const auto of = rested_points(r, first, start.cell.parameters.capacity_ah);
     points.insert(points.end(), of.begin(), of.end());
   }
@@ -101,11 +128,15 @@ void adapt_start(const IdentifyOptions& options, const std::vector<measurement::
   if (start.other_cell || options.limits.any()) derive(options, recordings, start, warnings);
   if (options.ocv_from_rests) {
     take_ocv_from_rests(options, recordings, start, warnings);
+  } else if (options.ocv_from_load) {
+    take_ocv_from_load(options, recordings, start, warnings);
   } else if (start.other_cell && options.ocv.empty()) {
     warnings.push_back(
-        {"ocv_of_start", fmt::format("the OCV is that of {}: --ocv-from-rests takes it from the rests of "
-                                     "the recordings, --ocv from a slow charge or discharge",
-                                     options.start)});
+        {"ocv_of_start",
+         fmt::format("the OCV is that of {}: --ocv-from-rests takes it from the rests of "
+                     "the recordings, --ocv-from-load from a discharge under load, --ocv from a slow charge or "
+                     "discharge",
+                     options.start)});
   }
 }
 

@@ -96,6 +96,14 @@ TEST(RecordingCheck, FindsWhatNoPhysicsExplains) {
   PreparedRecording inverted = healthy();
   for (double& a : inverted.current_a.edit()) a = -a;
   EXPECT_THAT(faults_of(inverted), ElementsAre("current_inverted"));
+  // a discharge at constant current has no step; the voltage falls while charge is counted in
+  PreparedRecording discharge =
+      test::recorded(std::vector<double>(1'800, -6.0), 0.6, 5, [](std::size_t k, double, double) {
+        return -0.2 * static_cast<double>(k) / 1'800;  // steeper than the plateau of this cell
+      });
+  EXPECT_THAT(faults_of(discharge), ElementsAre());
+  for (double& a : discharge.current_a.edit()) a = -a;
+  EXPECT_THAT(faults_of(discharge), ElementsAre("current_inverted"));
 
   PreparedRecording milli = healthy();
   for (double& a : milli.current_a.edit()) a *= 1'000;

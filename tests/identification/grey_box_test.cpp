@@ -100,6 +100,49 @@ TEST(GreyBox, TheOcvBranchPositionMovesTheCurveByItsHalfGap) {
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) EXPECT_NEAR(back.ocv.b0_v[k], cell.ocv.b0_v[k], 1e-12);
 }
 
+TEST(GreyBox, TheOcvBranchPositionIsLimitedToThoseAtWhichTheCurveRises) {
+  model::CellParameters<> cell = table9();
+  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02);
+  // near empty slow charge lies far above slow discharge: towards it the curve would fall
+  cell.ocv.half_gap_v[0] = 0.02 + 2 * cell.ocv.b1_v[0] * (cell.ocv.soc[1] - cell.ocv.soc[0]);
+  GreyBoxOptions options;
+  options.soc_nodes = {0.5};
+  options.estimate_ocv_branch = true;
+  DataSet record;
+  record.data = irregular(20);
+  const GreyBox grey_box(cell, {record}, options);
+  const LeastSquares problem = grey_box.problem();
+  Eigen::VectorXd x = grey_box.start();
+  EXPECT_NEAR(problem.upper[3], 0.5, 0.01);
+  EXPECT_EQ(problem.lower[3], -1);
+  for (const double position : {problem.lower[3], problem.upper[3]}) {
+    x[3] = position;
+    const auto moved = grey_box.cell_with(x);
+    for (std::size_t k = 0; k < moved.ocv.b1_v.size; ++k) EXPECT_GT(moved.ocv.b1_v[k], 0) << position << " " << k;
+  }
+}
+
+TEST(GreyBox, TheOcvBranchPositionIsLimitedToSlopesThatACellFileMayState) {
+  model::CellParameters<> cell = table9();
+  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02);
+  // near empty slow charge rises by 100 V per unit of soc more than slow discharge
+  cell.ocv.half_gap_v[0] = 0.02 - 50 * (cell.ocv.soc[1] - cell.ocv.soc[0]);
+  GreyBoxOptions options;
+  options.soc_nodes = {0.5};
+  options.estimate_ocv_branch = true;
+  DataSet record;
+  record.data = irregular(20);
+  const GreyBox grey_box(cell, {record}, options);
+  const LeastSquares problem = grey_box.problem();
+  Eigen::VectorXd x = grey_box.start();
+  for (const double position : {problem.lower[3], problem.upper[3]}) {
+    x[3] = position;
+    const auto moved = grey_box.cell_with(x);
+    EXPECT_GT(moved.ocv.b1_v[0], 0) << position;
+    EXPECT_LE(moved.ocv.b1_v[0], 60) << position;
+  }
+}
+
 TEST(GreyBox, RejectsMissingNodesRecordingsAndHalfGaps) {
   DataSet record;
   record.data = irregular(20);

@@ -1,0 +1,55 @@
+// What no mechanism describes, put into recordings of the plant's cell: the law must be named, and its term must help
+// on a recording that was not used.
+#include "diagnosis/law_term.hpp"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/diagnose.hpp"
+#include "diagnosis/prepare.hpp"
+#include "tests/diagnosis/synthetic_recordings.hpp"
+
+namespace bms::diagnosis {
+namespace {
+
+using AddV = std::function<double(std::size_t, double, double)>;
+
+std::optional<LawTerm> learned(const AddV& add_v) {
+  const LikelihoodModel likelihood =
+      likelihood_model_of(test::table9(), {}, {test::recorded(test::drive(2, 31), 0.75, 31, add_v)});
+  return learn_law_term(likelihood, likelihood.noise(), "");
+}
+
+double error_v(const model::CellParameters<>& cell, const PreparedRecording& record) {
+  const std::vector<double> v = predict(cell, {}, record);
+  double sum = 0;
+  for (std::size_t k = 0; k < v.size(); ++k) sum += std::pow(v[k] - record.voltage_v[k], 2);
+  return std::sqrt(sum / static_cast<double>(v.size()));
+}
+
+void expect_named_and_modelled(const char* law, const AddV& add_v) {
+  const auto term = learned(add_v);
+  ASSERT_TRUE(term && term->cell) << law;
+  EXPECT_EQ(term->law, law);
+  EXPECT_LT(term->left_out_after_v, term->left_out_before_v);
+  EXPECT_EQ(model::first_fault(*term->cell).what, nullptr) << model::first_fault(*term->cell).key;
+  const PreparedRecording later = test::recorded(test::drive(1.5, 32), 0.7, 32, add_v);
+  EXPECT_LT(error_v(*term->cell, later), 0.5 * error_v(test::table9(), later)) << law;
+}
+
+TEST(LawTerm, AnOcvOfAnotherShapeIsNamedAndModelled) {
+  expect_named_and_modelled("ocv",
+                            [](std::size_t, double, double soc) { return 0.015 * std::tanh((soc - 0.55) / 0.06); });
+}
+
+TEST(LawTerm, AResistanceOfAnotherShapeIsNamedAndModelled) {
+  expect_named_and_modelled("ohmic", [](std::size_t, double current_a, double soc) {
+    return 0.003 * (1 + std::sin(2 * 3.14159265 * soc / 0.5)) * current_a;
+  });
+}
+
+TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }
+
+}  // namespace
+}  // namespace bms::diagnosis
