@@ -50,6 +50,7 @@ std::string json_of(const host_sim::CutResult& r) {
   json["cell"] = r.cell;
   json["cuts"] = r.cuts;
   json["from_s"] = host_sim::cut_from_s;
+  json["within_2_sigma_limits"] = host_sim::cut_inside_limits;
   json["starts"] = Json::array();
   for (const host_sim::CutFigures& f : r.starts) {
     Json start = {{"start", f.start.id},
@@ -59,6 +60,7 @@ std::string json_of(const host_sim::CutResult& r) {
                   {"median_rmse_after_knee", f.median_rmse_after_knee},
                   {"within_sigmas", f.inside},
                   {"worst_within_2_sigma", f.worst_inside},
+                  {"cuts_below", f.cuts_below},
                   {"median_error_over_sigma", f.median_ratio},
                   {"median_sigma", f.median_sigma},
                   {"recovered", f.recovered}};
