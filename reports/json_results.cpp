@@ -201,6 +201,7 @@ Json left_out_of(const identification::LeftOutError& e) {
           {"resistance_error", e.resistance_error},
           {"soc_error", e.soc_error},
           {"rest_v", e.rest_v},
+          {"overpotential_v", e.overpotential_v},
           {"correlation_s", e.correlation_s},
           {"beyond_per_ev", e.beyond_per_ev}};
 }
