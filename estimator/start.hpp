@@ -4,7 +4,7 @@
 // the OCV curve with a standard deviation. Every SOC from 0 to 1 is weighted by how well its OCV fits; the start is the
 // mean and standard deviation of this distribution. On the plateau that is a wide band, as it should be.
 //
-// Cost: one pass over 256 points, once.
+// Cost: two passes over 256 points, once.
 #pragma once
 
 #include <cstddef>
@@ -139,24 +139,26 @@ constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell, More>& misfit_o
   const auto misfit = [&](int k) { return misfit_of(point(k), half_step, interval); };
   // the smallest misfit is subtracted from all, so that a voltage outside the curve still has weights
   Exponent<S> least = misfit(0);
+  Soc<S> best = point(0);
   for (int k = 1; k < points; ++k) {
     const Exponent<S> m = misfit(k);
-    if (m < least) least = m;
+    if (!(m < least)) continue;
+    least = m;
+    best = point(k);
   }
   Variance<S> weights{}, first{}, second{};  // the widest type: sums of 256 weights of at most 1/256
   for (int k = 0; k < points; ++k) {
     const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    const Soc<S> off = point(k) - best;
     weights = Variance<S>(weights + weight);
     first = Variance<S>(first + weight * point(k));
-  }
-  const Soc<S> mean = ratio<Soc<S>>(first, weights);
-  for (int k = 0; k < points; ++k) {
-    const Soc<S> off = point(k) - mean;
-    const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
     second = Variance<S>(second + weight * Fraction<S>(off * off));
   }
+  const Soc<S> mean = ratio<Soc<S>>(first, weights), off = mean - best;
+  const Variance<S> about_mean = Variance<S>(Variance<S>(ratio<Fraction<S>>(second, weights)) - Variance<S>(off * off));
   // the spacing of the points limits the accuracy
-  const Variance<S> variance = Variance<S>(ratio<Fraction<S>>(second, weights)) + Variance<S>(spacing * spacing);
+  const Variance<S> variance =
+      (about_mean > Variance<S>(0) ? about_mean : Variance<S>(0)) + Variance<S>(spacing * spacing);
   return {mean, variance};
 }
 
