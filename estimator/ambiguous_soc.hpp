@@ -60,6 +60,13 @@ class AmbiguousSoc {
   constexpr BankEvent update(const Cell& cell, const model::StepInput<S>& input, const Constants& constants,
                              const Soc& soc, const Voltage& deviation_v, const Variance& drop_v2, std::uint8_t interval,
                              State& state) {
+    if (bank_.has_run_off(soc)) {  // by an offset of the current: it begins again, or stops to watch
+      if (in_background_) {
+        bank_.close();
+        return BankEvent::none;
+      }
+      bank_.open_at(soc, [](const Soc&) { return arithmetic::Exponent<S>(0); });
+    }
     const auto& laws = laws_of(cell);
     const model::OperatingPoint operating_point{cell, input, Model::mechanism_states(state.model_state)};
     const auto middle = look_up(operating_point, soc, interval);

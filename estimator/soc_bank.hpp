@@ -65,6 +65,10 @@ class SocBank {
     }
   }
 
+  /// Whether more than a whole capacity was counted since open_at(), so that no hypothesis is in its place any more.
+  /// soc: as in step().
+  constexpr bool has_run_off(const Soc& soc) const { return arithmetic::magnitude(Soc(soc - mean_)) > Soc(1); }
+
   /// A voltage as one hypothesis sees it.
   struct Observation {
     Voltage off_v;           ///< measured minus expected
