@@ -1,5 +1,9 @@
 // The state of charge while more than one value fits the voltages: connects the bank of hypotheses (soc_bank.hpp) to
 // the state of the filter. While the bank is open, it corrects the SOC; the other states follow the prediction.
+//
+// Resistances depend on the SOC, in the cold by a factor of ten: a polarisation that was predicted at one SOC is scaled
+// to that of each hypothesis. Otherwise a wrong SOC near empty would explain itself by its own large resistance.
+// The error of a polarisation relaxes within its time constant, so it is noise; that of the other states is a bias.
 #pragma once
 
 #include <cstddef>
@@ -13,6 +17,9 @@
 
 namespace bms::estimator {
 
+/// What a sample changed.
+enum class BankEvent : std::uint8_t { none, estimated };
+
 template <class S, template <class> class ModelOf>
 class AmbiguousSoc {
   using Model = ModelOf<S>;
@@ -24,54 +31,108 @@ class AmbiguousSoc {
   using Fraction = arithmetic::Fraction<S>;
 
  public:
-  constexpr bool open() const { return bank_.open(); }
+  /// Difference of misfits from which the bank's best hypothesis replaces the state of the filter: e to 1.
+  static constexpr double replaces_above = 1;
+  /// The bank watches until all SOCs this far away have a misfit of that much more: e^9 to 1.
+  static constexpr double watches_beyond = 0.1, closes_above = 9;
 
-  /// Starts the bank. mean: SOC of the filter; misfit(soc, half a step of the grid, interval): >= 0.
-  template <class Cell, class Misfit>
-  constexpr void open_at(const Cell& cell, const State& state, const Soc& mean, const Misfit& misfit) {
+  constexpr bool open() const { return bank_.open(); }
+  /// The bank only watches: the filter goes on until its state is contradicted.
+  constexpr bool in_background() const { return in_background_; }
+
+  /// Starts the bank. mean: SOC of the filter; misfit(soc, half a step of the grid, interval): >= 0; deviation_v2:
+  /// variance of the voltage's error that the last half hour showed.
+  template <class Misfit>
+  constexpr void open_at(const Soc& mean, const Misfit& misfit, bool in_background = false,
+                         const Variance& deviation_v2 = Variance{}) {
     std::uint8_t interval = 0;
-    bank_.open_at(mean, persistent_variance(cell.noise, state),
-                  [&](const Soc& soc) { return misfit(soc, half_step(), interval); });
+    in_background_ = in_background;
+    deviation_v2_ = deviation_v2;
+    bank_.open_at(mean, [&](const Soc& soc) { return misfit(soc, half_step(), interval); });
   }
 
-  /// One sample: updates the bank and, when it has a result, the SOC of the state. soc: predicted; interval: of soc.
+  /// The filter corrected its SOC by `by` while the bank watches.
+  constexpr void follow(const Soc& by) { bank_.follow(by); }
+
+  /// One sample: updates the bank and, when it has a result, the SOC of the state. soc: predicted; deviation_v: of the
+  /// reading from the model without the estimated voltage error, which belongs to the filter's SOC; interval: of soc.
   template <class Cell, class Constants>
-  constexpr void update(const Cell& cell, const model::StepInput<S>& input, const Constants& constants, const Soc& soc,
-                        const Voltage& innovation_v, std::uint8_t interval, State& state) {
+  constexpr BankEvent update(const Cell& cell, const model::StepInput<S>& input, const Constants& constants,
+                             const Soc& soc, const Voltage& deviation_v, const Variance& drop_v2, std::uint8_t interval,
+                             State& state) {
+    if (bank_.has_run_off(soc)) {  // by an offset of the current: it begins again, or stops to watch
+      if (in_background_) {
+        bank_.close();
+        return BankEvent::none;
+      }
+      bank_.open_at(soc, [](const Soc&) { return arithmetic::Exponent<S>(0); });
+    }
     const auto& laws = laws_of(cell);
     const model::OperatingPoint operating_point{cell, input, Model::mechanism_states(state.model_state)};
     const auto middle = look_up(operating_point, soc, interval);
+    const model::StepInput<S> reference{cell.noise.one_c_a, input.duration_s, input.temperature_c};
+    const auto final_v = [&](const auto& at) { return Model::final_voltages(laws, state.model_state, at, reference); };
+    const auto middle_v = final_v(middle);
     const Voltage expected_v = Model::voltage(laws, state.model_state, middle, input);
-    const Variance drop_v2 = drop_variance_v2<S>(middle, input.current_a, constants.resistance_error());
+    const Fraction uncorrelated(uncorrelated_share);
+    const auto h = Model::measurement_jacobian(laws, middle, input);
+    const auto states_v2 = state.covariance.variances();
+    const Variance relaxing_v2 =
+        sum_variance<Model>(states_v2, h, [&](std::size_t k) { return Model::is_polarisation(laws, k); });
+    const Variance lasting_v2 = sum_variance<Model>(states_v2, h, [&](std::size_t k) {
+      return !Model::is_polarisation(laws, k) && !(Model::errors_are_states && k == Model::voltage_error);
+    });
     const Variance new_v2 =
-        Variance(arithmetic::product<Variance>(cell.noise.model_v2, Fraction(uncorrelated_share)) + drop_v2);
+        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated) + relaxing_v2);
+    const Variance persistent_v2 =
+        Variance(Variance(cell.noise.model_v2 + lasting_v2) + Variance(drop_v2 + deviation_v2_));
     const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
       const auto at = look_up(operating_point, there, interval);
-      return {.off_v = Voltage(innovation_v + (expected_v - Model::voltage(laws, state.model_state, at, input))),
+      const auto polarised = Model::polarisation_at(state.model_state, middle_v, final_v(at));
+      const Voltage off_v = Voltage(deviation_v + (expected_v - Model::voltage(laws, polarised, at, input)));
+      const Variance axis_v2 = soc_axis_variance<S>(operating_point, cell.noise, at, there, off_v);
+      return {.off_v = off_v,
               .half_v = Voltage(ocv_slope<S>(at) * half_step()),
-              .new_v2 = Variance(new_v2 + soc_axis_variance<S>(cell, at))};
+              .new_v2 = new_v2,
+              .axis_v2 = arithmetic::product<Variance>(axis_v2, uncorrelated),
+              .persistent_v2 = Variance(persistent_v2 + axis_v2)};
     };
     const auto result = bank_.step(soc, constants.bank_share(), cell.noise.voltage_v2,
-                                   Variance(persistent_variance(cell.noise, state) + drop_v2), observation);
-    if (!result.ready) return;
+                                   Variance(cell.noise.model_v2 + lasting_v2), observation);
+    if (!result.ready) return BankEvent::none;
+    const Soc moved = Soc(soc + result.moved);
+    if (in_background_ && !(bank_.misfit_at(soc, moved) > arithmetic::Current<S>(replaces_above))) {
+      close_if_decided(soc, moved);
+      bank_.follow(Soc(-result.moved));
+      return BankEvent::none;
+    }
     state.charge.correct(result.moved, cell.charge);
+    const auto there = look_up(operating_point, moved, interval);
+    state.model_state = Model::polarisation_at(state.model_state, middle_v, final_v(there));
     state.covariance.template reset<Model::soc>(result.variance);
-    if (result.variance < Variance(SocBank<S>::close_below_sigma * SocBank<S>::close_below_sigma)) bank_.close();
+    in_background_ = result.variance < Variance(SocBank<S>::close_below_sigma * SocBank<S>::close_below_sigma);
+    if (in_background_) close_if_decided(moved, moved);
+    return BankEvent::estimated;
   }
 
   /// Variance of the voltage errors that persist while the bank is open: the model's, and those of the states that are
-  /// not corrected then.
-  static constexpr Variance persistent_variance(const model::FilterNoise<S>& noise, const State& state) {
-    Variance sum = Errors::model_error_in_bank(noise);
-    const auto states_v2 = state.covariance.variances();
-    for (std::size_t k = 0; k < Model::soc; ++k) sum = Variance(sum + states_v2[k]);
-    return sum;
+  /// not corrected then. h: measurement Jacobian.
+  static constexpr Variance persistent_variance(const model::FilterNoise<S>& noise, const State& state,
+                                                const typename Model::MeasurementJacobian& h) {
+    return Variance(Errors::model_error_in_bank(noise) +
+                    sum_variance<Model>(state.covariance.variances(), h, [](std::size_t) { return true; }));
   }
 
  private:
+  constexpr void close_if_decided(const Soc& soc, const Soc& filter_soc) {
+    if (bank_.rules_out_beyond(Soc(watches_beyond), arithmetic::Current<S>(closes_above), soc, filter_soc))
+      bank_.close();
+  }
   static constexpr Fraction half_step() { return Fraction(0.5 / SocBank<S>::points); }
 
   SocBank<S> bank_;
+  Variance deviation_v2_{};
+  bool in_background_ = false;
 };
 
 }  // namespace bms::estimator

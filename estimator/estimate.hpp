@@ -17,14 +17,17 @@ enum Flag : std::uint32_t {
   voltage_stuck = 1U << 2,        ///< the reading stays the same while the model's voltage changes
   current_missing = 1U << 3,
   current_implausible = 1U << 4,
-  time_gap = 1U << 5,             ///< more than ten times the usual step: the charge in between is uncertain
-  time_not_increasing = 1U << 6,  ///< the sample was ignored
-  not_started = 1U << 8,          ///< no usable voltage yet and no starting point
-  soc_ambiguous = 1U << 9,        ///< more than one state of charge fits the voltages so far; soc_sigma spans them
+  time_gap = 1U << 5,               ///< more than ten times the usual step: the charge in between is uncertain
+  time_not_increasing = 1U << 6,    ///< the sample was ignored
+  current_beyond_limits = 1U << 7,  ///< beyond the plausible range, but it lasts: used
+  not_started = 1U << 8,            ///< no usable voltage yet and no starting point
+  soc_ambiguous = 1U << 9,          ///< more than one state of charge fits the voltages so far; soc_sigma spans them
   /// Far from every voltage that the model can explain, so not used. If this persists, the SOC is estimated again.
   voltage_rejected = 1U << 10,
   /// A result was not a number. The estimator started again from the counted charge, with an unknown SOC.
   not_a_number = 1U << 11,
+  /// The voltages of the last half hour contradicted the state of charge, which is being estimated again.
+  soc_contradicted = 1U << 12,
 };
 
 template <class S>

@@ -8,7 +8,7 @@
 //   gap           a time step more than `gap_factor` times the usual one
 //
 // A current that fails is replaced by the last accepted one. Its uncertainty is then current_unknown_a of the cell
-// file.
+// file. An implausible current that lasts is used, with a flag of its own.
 //
 // Current and voltage are checked in two calls, the voltage after the prediction: the check for a stuck voltage needs
 // the model's drop. Checking all of a sample at once before the prediction costs 18 instructions a step.
@@ -31,7 +31,10 @@ struct AcceptedCurrent {
 template <class S>
 class InputCheck {
  public:
-  static constexpr std::uint8_t stuck_after = 5;   ///< samples
+  static constexpr std::uint8_t stuck_after = 5;  ///< samples
+  /// Samples in a row beyond the plausible range, with the same sign, after which a current is used: the limits of the
+  /// cell file may be those of another cell.
+  static constexpr std::uint8_t lasts_after = 5;
   static constexpr std::uint32_t gap_factor = 10;  ///< times the usual step
   static constexpr double stuck_move_v = 0.02;     ///< far above the step of any ADC, below the effect of any load
 
@@ -42,8 +45,18 @@ class InputCheck {
       current_ua_ = current_ua;
       return {current_ua, true};
     }
+    if (current_ua_ != beyond) {  // the reading before was accepted
+      accepted_ua_ = current_ua_;
+      beyond_ = 0;
+      current_ua_ = beyond;
+    }
+    if (lasts_beyond_limits(current_ua)) {
+      flags |= current_beyond_limits;
+      accepted_ua_ = current_ua;
+      return {current_ua, true};
+    }
     flags |= current_ua == measurement::no_reading ? current_missing : current_implausible;
-    return {current_ua_, false};
+    return {accepted_ua_, false};
   }
 
   /// Returns true if the voltage is present, plausible and not stuck; else sets a flag. drop_v: R0 times the present
@@ -97,7 +110,22 @@ class InputCheck {
   }
 
  private:
+  /// Counts readings beyond the plausible range: up for a charge, down for a discharge.
+  [[gnu::noinline]] constexpr bool lasts_beyond_limits(std::int32_t current_ua) {
+    if (current_ua == measurement::no_reading) {
+      beyond_ = 0;
+      return false;
+    }
+    if (current_ua > 0)
+      beyond_ = static_cast<std::int8_t>(beyond_ < 0 ? 1 : beyond_ + (beyond_ < lasts_after ? 1 : 0));
+    else
+      beyond_ = static_cast<std::int8_t>(beyond_ > 0 ? -1 : beyond_ - (beyond_ > -lasts_after ? 1 : 0));
+    return beyond_ >= lasts_after || beyond_ <= -lasts_after;
+  }
+
   static constexpr std::uint8_t stuck = 0xFF;
+  /// In current_ua_: the last reading was not plausible. So a plausible one resets beyond_ without a store of its own.
+  static constexpr std::int32_t beyond = measurement::no_reading;
 
   static constexpr bool within(std::int32_t value, std::int32_t low, std::int32_t high) {
     return static_cast<std::uint32_t>(value) - static_cast<std::uint32_t>(low) <=
@@ -105,9 +133,11 @@ class InputCheck {
   }
 
   std::uint32_t usual_step_us_ = 0;
-  std::int32_t current_ua_ = 0;
+  std::int32_t current_ua_ = 0;   ///< last reading if it was plausible, or `beyond`
+  std::int32_t accepted_ua_ = 0;  ///< last accepted reading, after an implausible one
   std::int32_t voltage_uv_ = measurement::no_reading;
   arithmetic::Voltage<S> drop_at_change_v_{};
+  std::int8_t beyond_ = 0;    ///< currents beyond the plausible range in a row, with their sign
   std::uint8_t repeats_ = 0;  ///< of the same voltage, or `stuck`
 };
 

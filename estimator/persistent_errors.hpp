@@ -29,6 +29,7 @@ template <class S, template <class> class ModelOf>
 class PersistentErrorsInSigma {
   using State = CellState<S, ModelOf>;
   using Soc = arithmetic::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
   using Noise = model::FilterNoise<S>;
@@ -49,6 +50,14 @@ class PersistentErrorsInSigma {
   }
   /// The same part while the bank of hypotheses is open, without the SOC axis.
   static constexpr Variance model_error_in_bank(const Noise& noise) { return noise.model_v2; }
+  /// Variance of the model's error in a voltage from which the estimated error was not subtracted, in addition to the
+  /// variances of the states.
+  static constexpr Variance model_error_beyond_states(const Noise&) { return Variance{}; }
+
+  /// A predicted voltage without the estimated error of the voltage.
+  static constexpr Voltage without_error(const State&, const Voltage& v) { return v; }
+  /// An innovation with it: the deviation from the model.
+  static constexpr Voltage with_error(const State&, const Voltage& v) { return v; }
 
   constexpr void start(const Soc&) {}
   constexpr void add_gain_error(Variance&, const Soc&, const Fraction&) {}
@@ -80,9 +89,19 @@ class PersistentErrorsAsStates {
   }
   template <class F>
   static constexpr Variance error_in_noise(const Noise& noise, const Variance&, F&& soc_axis_v2) {
-    return Variance(arithmetic::product<Variance>(noise.model_v2, Fraction(uncorrelated_share)) + soc_axis_v2());
+    // the axis of the tables is off by one constant, so it counts once while the error of the voltage persists
+    return Variance(arithmetic::product<Variance>(noise.model_v2, Fraction(uncorrelated_share)) +
+                    arithmetic::product<Variance>(soc_axis_v2(), Count(model::persistent_error_correlations)));
   }
   static constexpr Variance model_error_in_bank(const Noise&) { return Variance{}; }
+  static constexpr Variance model_error_beyond_states(const Noise& noise) { return noise.model_v2; }
+
+  static constexpr Voltage without_error(const State& state, const Voltage& v) {
+    return Voltage(v - state.model_state[Model::voltage_error]);
+  }
+  static constexpr Voltage with_error(const State& state, const Voltage& v) {
+    return Voltage(v + state.model_state[Model::voltage_error]);
+  }
 
   constexpr void start(const Soc& soc) { corrected_soc_ = soc; }
 

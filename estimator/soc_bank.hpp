@@ -3,12 +3,16 @@
 // curve, as a Kalman filter uses it, would choose one of them and be certain.
 //
 //   e_k = |v - V(soc_k) - b_k| - w_k           beyond w_k, half a step of the grid on the curve
-//   misfit_k += e_k^2 / (2 (p + r)) + ln r / 2         b_k += p / (p + r) e_k
+//   misfit_k += e_k^2 / (2 (p_k + r_k)) + ln(p_k + r) / 2         b_k += p_k / (p_k + r_k) e_k
 //
-// The model's error persists: each hypothesis has its own bias b_k, with the standard deviation noise.model_v at first.
-// A constant deviation over hours therefore counts once, and crossing a knee of the curve, or not, decides. r is the
-// variance that is uncorrelated after one correlation time. Where the curve is steep, r is large, so every voltage fits
-// there; the term ln r compensates for this. The variance p of the biases is the same for all hypotheses.
+// The model's error persists: each hypothesis has its own bias b_k, of variance p_k at first. A constant deviation over
+// hours therefore counts once, and crossing a knee of the curve, or not, decides. r is the variance that is
+// uncorrelated after one correlation time. Where the curve is steep, p_k is large, so every voltage fits there; the
+// term ln compensates for this. The share of p_k that is left is the same for all hypotheses.
+//
+// The error of the SOC axis is one constant shift. It is a part of p_k. What it changes while the SOC moves is a part
+// of r_k but not of r: counted in ln once in every correlation time, it would rule out the true SOC on a steep part of
+// the curve where the model is exact.
 //
 // One point is processed per sample: during `points` samples the misfits are updated, during the next `points` the
 // weights exp(-misfit) are summed; then mean and variance are computed. So every step costs the same. (The point-mass
@@ -44,15 +48,15 @@ class SocBank {
   constexpr bool open() const { return open_; }
   constexpr void close() { open_ = false; }
 
-  /// Starts. mean: present SOC of the filter; persistent_variance: of the model's error; misfit(soc): initial misfit,
-  /// >= 0.
+  /// Starts. mean: present SOC of the filter; misfit(soc): initial misfit, >= 0.
   template <class F>
-  constexpr void open_at(const Soc& mean, const Variance& persistent_variance, F&& misfit) {
+  constexpr void open_at(const Soc& mean, F&& misfit) {
     open_ = true;
     turn_ = 0;
     mean_ = mean;
     bias_v_ = {};
-    bias_v2_ = persistent_variance;
+    bias_share_ = Fraction(1);
+    lasting_v2_ = Variance{};
     gain_sum_ = Sum(0);
     least_ = Misfit(2'000);
     for (int k = 0; k < points; ++k) {
@@ -61,11 +65,17 @@ class SocBank {
     }
   }
 
+  /// Whether more than a whole capacity was counted since open_at(), so that no hypothesis is in its place any more.
+  /// soc: as in step().
+  constexpr bool has_run_off(const Soc& soc) const { return arithmetic::magnitude(Soc(soc - mean_)) > Soc(1); }
+
   /// A voltage as one hypothesis sees it.
   struct Observation {
-    Voltage off_v;    ///< measured minus expected
-    Voltage half_v;   ///< half a step of the grid on the curve
-    Variance new_v2;  ///< variance that is uncorrelated after one correlation time
+    Voltage off_v;           ///< measured minus expected
+    Voltage half_v;          ///< half a step of the grid on the curve
+    Variance new_v2;         ///< r: variance that is uncorrelated after one correlation time
+    Variance axis_v2;        ///< the same of the SOC axis: r_k - r
+    Variance persistent_v2;  ///< p_k, if nothing was seen yet. Decays in model::persistent_error_correlations
   };
   struct BankUpdate {
     bool ready = false;
@@ -74,11 +84,16 @@ class SocBank {
   };
 
   /// One sample. soc: of the filter, the mean plus the charge counted since; share: correlation times that pass in
-  /// 2 `points` samples, max_share at most; white_v2: variance of the reading; persistent_variance: as in open_at(), it
-  /// decays in model::persistent_error_correlations correlation times; observation(soc_k): Observation.
+  /// 2 `points` samples, max_share at most; white_v2: variance of the reading; lasting_v2: part of p_k that is
+  /// the same for all. Where it falls, because the branch of the hysteresis becomes known, the biases fall with it.
+  /// observation(soc_k): Observation.
   template <class F>
-  constexpr BankUpdate step(const Soc& soc, const Fraction& share, const Variance& white_v2,
-                            const Variance& persistent_variance, F&& observation) {
+  constexpr BankUpdate step(const Soc& soc, const Fraction& share, const Variance& white_v2, const Variance& lasting_v2,
+                            F&& observation) {
+    if (turn_ == 0) {
+      bias_left_ = lasting_v2 < lasting_v2_ ? arithmetic::ratio<Fraction>(lasting_v2, lasting_v2_) : Fraction(1);
+      lasting_v2_ = lasting_v2;
+    }
     const auto k = static_cast<std::size_t>(turn_ % points);
     if (turn_ < points)
       update_misfit(k, share, white_v2, observation(Soc(grid(static_cast<int>(k)) + (soc - mean_))));
@@ -88,10 +103,9 @@ class SocBank {
     turn_ = 0;
     // the biases were corrected, and decayed
     const Fraction decayed = decay_in(share), mean_gain = Fraction(gain_sum_ * Fraction(1.0 / points));
-    bias_v2_ = Variance(bias_v2_ - arithmetic::product<Variance>(bias_v2_, mean_gain));
-    bias_v2_ = Variance(bias_v2_ + arithmetic::product<Variance>(
-                                       arithmetic::product<Variance>(Variance(persistent_variance - bias_v2_), decayed),
-                                       Fraction(Fraction(2) - decayed)));
+    bias_share_ = Fraction(bias_share_ - bias_share_ * mean_gain);
+    const Fraction returned = Fraction(Fraction(Fraction(1) - bias_share_) * decayed);
+    bias_share_ = Fraction(bias_share_ + returned * Fraction(Fraction(2) - decayed));
     gain_sum_ = Sum(0);
     const Soc mean = arithmetic::ratio<Soc>(first_, weights_);
     const Fraction step(1.0 / points);
@@ -100,6 +114,46 @@ class SocBank {
     bank_update.variance = bank_update.variance < Variance(0) ? finest : Variance(bank_update.variance + finest);
     mean_ = mean;
     return bank_update;
+  }
+
+  /// The SOC of the filter was changed by `by` other than by counted charge, or was not moved to
+  /// the mean of the last step: then by is minus BankUpdate::moved.
+  constexpr void follow(const Soc& by) { mean_ = Soc(mean_ + by); }
+  /// Misfit of the hypothesis next to soc, or of one of its neighbours, above the smallest one; after a step that is
+  /// ready. filter_soc: as in step().
+  constexpr Misfit misfit_at(const Soc& soc, const Soc& filter_soc) const {
+    const Soc on_grid = Soc(soc - (filter_soc - mean_));
+    Misfit least(2'000);
+    for (int k = 0; k < points; ++k) {
+      const Misfit m = misfit_[static_cast<std::size_t>(k)];
+      if (arithmetic::magnitude(Soc(grid(k) - on_grid)) < Soc(2.0 / points) && m < least) least = m;
+    }
+    return Misfit(least - least_);
+  }
+
+  /// Whether every hypothesis further than `beyond` from soc has a misfit of `above` more than the smallest one; after
+  /// a step that is ready. filter_soc: as in step().
+  constexpr bool rules_out_beyond(const Soc& beyond, const Misfit& above, const Soc& soc, const Soc& filter_soc) const {
+    const Soc on_grid = Soc(soc - (filter_soc - mean_));
+    for (int k = 0; k < points; ++k) {
+      if (arithmetic::magnitude(Soc(grid(k) - on_grid)) > beyond &&
+          Misfit(misfit_[static_cast<std::size_t>(k)] - least_) < above)
+        return false;
+    }
+    return true;
+  }
+
+  /// ln(v2 / 1e-6) / 2, and 0 below 1e-6; linear between powers of four, within 0.06.
+  static constexpr Misfit half_log(Variance v2) {
+    const auto unit = Variance(1e-6), four = Variance(4e-6);
+    const auto ln_2 = Misfit(0.69314718);
+    Misfit sum(0);
+    while (v2 > four) {
+      v2 = arithmetic::product<Variance>(v2, Fraction(0.25));
+      sum = Misfit(sum + ln_2);
+    }
+    return v2 > unit ? Misfit(sum + ln_2 * arithmetic::ratio<Fraction>(Variance(v2 - unit), Variance(four - unit)))
+                     : sum;
   }
 
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
@@ -113,19 +167,6 @@ class SocBank {
     return share * Fraction(1.0 / model::persistent_error_correlations);
   }
 
-  /// ln(v2 / 1 mV^2) / 2, and 0 below 1 mV^2; linear between powers of four, within 0.06.
-  static constexpr Misfit half_log(Variance v2) {
-    const auto unit = Variance(1e-6), four = Variance(4e-6);
-    const auto ln_2 = Misfit(0.69314718);
-    Misfit sum(0);
-    while (v2 > four) {
-      v2 = arithmetic::product<Variance>(v2, Fraction(0.25));
-      sum = Misfit(sum + ln_2);
-    }
-    return v2 > unit ? Misfit(sum + ln_2 * arithmetic::ratio<Fraction>(Variance(v2 - unit), Variance(four - unit)))
-                     : sum;
-  }
-
   /// Part of off_v outside of +-half_v.
   static constexpr Voltage beyond(const Voltage& off_v, const Voltage& half_v) {
     if (off_v > half_v) return Voltage(off_v - half_v);
@@ -135,19 +176,21 @@ class SocBank {
   constexpr void update_misfit(std::size_t k, const Fraction& share, const Variance& white_v2,
                                const Observation& observation) {
     if (k == 0) next_least_ = Misfit(2'000);
-    bias_v_[k] = Voltage(bias_v_[k] - bias_v_[k] * decay_in(share));
+    bias_v_[k] = Voltage(Voltage(bias_v_[k] - bias_v_[k] * decay_in(share)) * bias_left_);
     const Voltage off_v = observation.off_v - bias_v_[k];
     const Voltage beyond_v = beyond(off_v, observation.half_v);
-    const Variance noise_v2 = Variance(
-        white_v2 + (share < Fraction(1) ? arithmetic::ratio<Variance>(observation.new_v2, share) : observation.new_v2));
-    const Variance all_v2 = Variance(bias_v2_ + noise_v2);
+    const Variance bias_v2 = arithmetic::product<Variance>(observation.persistent_v2, bias_share_);
+    const Variance varying_v2 = Variance(observation.new_v2 + observation.axis_v2);
+    const Variance noise_v2 =
+        Variance(white_v2 + (share < Fraction(1) ? arithmetic::ratio<Variance>(varying_v2, share) : varying_v2));
+    const Variance all_v2 = Variance(bias_v2 + noise_v2);
     const auto squares = arithmetic::ratio<Exponent>(Variance(beyond_v * beyond_v), Variance(all_v2 + all_v2));
-    const auto gain = arithmetic::ratio<Fraction>(bias_v2_, all_v2);
+    const auto gain = arithmetic::ratio<Fraction>(bias_v2, all_v2);
     const bool far = squares > Exponent(most);  // this may be one bad reading
     if (!far) bias_v_[k] = Voltage(bias_v_[k] + gain * beyond_v);
     gain_sum_ = Sum(gain_sum_ + gain);
-    const Misfit width =
-        Misfit(half_log(Variance(white_v2 + observation.new_v2)) * (share < Fraction(1) ? share : Fraction(1)));
+    const Misfit width = Misfit(half_log(Variance(Variance(white_v2 + observation.new_v2) + bias_v2)) *
+                                (share < Fraction(1) ? share : Fraction(1)));
     misfit_[k] = clamped(Misfit(Misfit(Misfit(misfit_[k] - least_) + width) + (far ? Misfit(most) : Misfit(squares))));
     if (misfit_[k] < next_least_) next_least_ = misfit_[k];
   }
@@ -168,7 +211,8 @@ class SocBank {
 
   std::array<Misfit, points> misfit_{};
   std::array<Voltage, points> bias_v_{};
-  Variance bias_v2_{};
+  Fraction bias_share_{}, bias_left_{1};
+  Variance lasting_v2_{};
   Sum gain_sum_{};
   Misfit least_{}, next_least_{};
   Variance weights_{}, first_{}, second_{};

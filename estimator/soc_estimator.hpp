@@ -9,9 +9,8 @@
 //   input_check.hpp         which readings are used
 //   step_constants.hpp      what depends on the time step and the temperature alone
 //   persistent_errors.hpp   errors that last for hours: as noise or as states
-//   outlier_gate.hpp        voltages that contradict everything known
-//   ambiguous_soc.hpp       the bank of hypotheses, open while the SOC is not known to 3 %: a line through the OCV
-//                           curve would be certain of one value
+//   first_state.hpp         the state at the first sample
+//   soc_monitor.hpp         finds out when the voltages contradict the SOC, and then estimates it again
 //   cell_state.hpp          the state itself
 //
 // One source for every scalar and for the 1RC model with any mechanisms (model/extended_rc.hpp: N states). The laws of
@@ -24,20 +23,18 @@
 // Memory: CellState<float> 24 bytes a cell; the rest is shared or guards inputs. Cost: estimator/README.md.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <type_traits>
 
-#include "estimator/ambiguous_soc.hpp"
 #include "estimator/cell_state.hpp"
 #include "estimator/estimate.hpp"
+#include "estimator/first_state.hpp"
 #include "estimator/input_check.hpp"
-#include "estimator/outlier_gate.hpp"
 #include "estimator/persistent_errors.hpp"
-#include "estimator/start.hpp"
+#include "estimator/soc_monitor.hpp"
 #include "estimator/step_constants.hpp"
 #include "estimator/voltage_uncertainty.hpp"
 #include "measurement/sample.hpp"
@@ -60,8 +57,7 @@ class SocEstimator {
   constexpr SocEstimator() = default;
 
   /// Starts from a known state of charge instead of the first voltage, clamped to 0 to 1; its sigma to 1e-6 to 1.
-  constexpr explicit SocEstimator(const measurement::StartingPoint& from)
-      : from_{clamped_to_one(from.soc_ppb), clamped_to_one(from.soc_sigma_ppb, 1'000)}, has_start_{true} {}
+  constexpr explicit SocEstimator(const measurement::StartingPoint& from) : from_(possible(from)), has_start_(true) {}
 
   /// Processes one sample. cell: prepared for S, the same in every call.
   template <class Cell>
@@ -70,10 +66,12 @@ class SocEstimator {
     if (sample.time_us <= time_us_) return repeated_estimate(cell, time_not_increasing);
 
     const std::uint64_t step_us = sample.time_us - time_us_;
+    if (Consistency<S>::turn_ends(time_us_, sample.time_us)) [[unlikely]]
+      monitor_.ask();
     time_us_ = sample.time_us;
     std::uint32_t flags = 0;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
-    if (step_us != checked_step_us_) set_time_step(cell, step_us, flags);
+    if (is_unchecked(step_us)) flags |= set_time_step(cell, step_us);
     if (sample.temperature_cdegc >> temperature_bin_bits != temperature_bin_) [[unlikely]]
       set_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
@@ -87,7 +85,7 @@ class SocEstimator {
     const auto discretisation = Model::discretise(laws, state_.model_state, at, input, constants_.error_decay());
     auto noise = Model::noise(laws, discretisation, cell.noise);
     noise[Model::soc] = constants_.soc_noise();
-    if ((flags & (time_gap | current_missing | current_implausible)) != 0) [[unlikely]]
+    if ((flags & unmeasured) != 0) [[unlikely]]
       add_unknown_current(cell, at, input, flags, noise);
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
     state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
@@ -96,7 +94,8 @@ class SocEstimator {
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
     errors_.update_offset_at_rest(state_, cell, current, step_us, constants_.duration_s());
     if (check_.voltage_usable(sample.voltage_uv, Voltage(at.r0_ohm * input.current_a), cell.plausible, flags))
-      correct(cell, at, input, soc, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v, flags);
+      correct(cell, at, input, soc, predicted_v, arithmetic::from_micro<Voltage>(sample.voltage_uv) - predicted_v,
+              flags);
     Result estimate;
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
@@ -125,6 +124,9 @@ class SocEstimator {
   using TimeStep = arithmetic::TimeStep<S>;
 
   static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
+
+  static constexpr std::uint32_t unmeasured = time_gap | current_missing | current_implausible;
+  static constexpr std::uint32_t voltage_was_used = 1U << 31;  ///< of check_voltage(); not a Flag
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
@@ -170,11 +172,18 @@ class SocEstimator {
     state_.charge.count(current_ua, static_cast<std::uint32_t>(step_us), cell.charge);
   }
 
+  /// Also true for every step of 2^32 us and more: comparing 64 bits costs one instruction more.
+  constexpr bool is_unchecked(std::uint64_t step_us) const {
+    return ((static_cast<std::uint32_t>(step_us) ^ checked_step_us_) | static_cast<std::uint32_t>(step_us >> 32)) != 0;
+  }
+  /// Returns the flags of the step. By value: flags whose address is taken would be kept in memory.
   template <class Cell>
-  [[gnu::noinline]] constexpr void set_time_step(const Cell& cell, std::uint64_t step_us, std::uint32_t& flags) {
+  [[gnu::noinline]] constexpr std::uint32_t set_time_step(const Cell& cell, std::uint64_t step_us) {
+    std::uint32_t flags = 0;
     // a gap is checked again even if the next step is as long: gaps of equal length are gaps
-    checked_step_us_ = check_.gap(constants_.capped(step_us), flags) ? 0 : step_us;
+    checked_step_us_ = check_.gap(constants_.capped(step_us), flags) ? 0 : static_cast<std::uint32_t>(step_us);
     constants_.set_time_step(cell.noise, step_us);
+    return flags;
   }
 
   template <class Cell>
@@ -199,64 +208,54 @@ class SocEstimator {
     noise[0] = Variance(noise[0] + unknown_v * unknown_v);
   }
 
+  /// predicted_v: before the correction.
   template <class Cell>
   constexpr void correct(const Cell& cell, const At& at, const StepInput& input, const Soc& soc,
-                         const Voltage& innovation_v, std::uint32_t& flags) {
+                         const Voltage& predicted_v, const Voltage& innovation_v, std::uint32_t& flags) {
+    if (monitor_.is_due(innovation_v)) [[unlikely]] {
+      const std::uint32_t found =
+          check_voltage(cell, input.current_a, input.temperature_c, soc, Voltage(predicted_v - at.ocv_v), innovation_v,
+                        (flags & unmeasured) == 0);
+      flags |= found & ~voltage_was_used;
+      if (found != 0) return;
+    }
+    observe(cell, at, input, innovation_v);
+  }
+
+  template <class Cell>
+  [[gnu::always_inline]] constexpr void observe(const Cell& cell, const At& at, const StepInput& input,
+                                                const Voltage& innovation_v) {
     const Voltage drop_v = steady_state_drop_v<S>(at, input.current_a);
-    const Variance drop_v2 = drop_v * drop_v;
-    if (ambiguous_.open()) [[unlikely]] {
-      flags |= soc_ambiguous;
-      return correct_from_bank(cell, input.current_a, input.temperature_c, soc, innovation_v);
-    }
-    if (OutlierGate<S>::is_suspect(innovation_v)) [[unlikely]] {
-      if (reject_outlier(cell, input.current_a, input.temperature_c, soc, innovation_v)) {
-        flags |= voltage_rejected;
-        return;
-      }
-    }
+    const Variance error_v2 =
+        Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell.noise, at); });
     const Variance model_v2 =
-        Variance(arithmetic::product<Variance>(
-                     Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell, at); }),
-                     constants_.correlated_samples()) +
-                 arithmetic::product<Variance>(drop_v2, constants_.resistance_noise()));
-    const Variance noise_v2 = Variance(cell.noise.voltage_v2 + model_v2);
+        Variance(arithmetic::product<Variance>(error_v2, constants_.correlated_samples()) +
+                 arithmetic::product<Variance>(Variance(drop_v * drop_v), constants_.resistance_noise()));
+    const Variance noise_v2 = Variance(monitor_.reading_noise_v2() + model_v2);
     state_.apply(
         state_.covariance.observe(Model::measurement_jacobian(laws_of(cell), at, input), noise_v2, innovation_v),
         cell.charge);
   }
 
-  // These two take their arguments by value: an argument passed by address would be kept in memory in every step.
+  // These take their arguments by value: an argument passed by address would be kept in memory in every step.
 
-  /// Returns true if the voltage was rejected. After OutlierGate::restart_after_us of rejections the bank is opened
-  /// around the present SOC, which estimates it again from the voltages.
+  /// What is done once in Consistency's turn, with a suspect voltage, and while the bank is open. above_ocv_v:
+  /// predicted voltage above the OCV. Returns 0 if the voltage is good and not used yet; else flags of this step, or
+  /// voltage_was_used.
   template <class Cell>
-  [[gnu::noinline]] constexpr bool reject_outlier(const Cell& cell, Current current_a, Temperature temperature_c,
-                                                  Soc soc, Voltage innovation_v) {
+  [[gnu::noinline]] constexpr std::uint32_t check_voltage(const Cell& cell, Current current_a,
+                                                          Temperature temperature_c, Soc soc, Voltage above_ocv_v,
+                                                          Voltage innovation_v, bool measured) {
+    monitor_.watch(cell, constants_, state_, time_us_, above_ocv_v, innovation_v, measured);
+    if (!monitor_.has_to_judge(innovation_v)) return 0;
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
+    const std::uint32_t found = monitor_.judge(cell, input, constants_, soc, innovation_v,
+                                               monitor_.overpotential_v2(above_ocv_v, state_), interval_, state_);
+    if (found != 0 || !monitor_.bank_is_open()) return found;
     std::uint8_t interval = interval_;
-    const At at = look_up(operating_point(cell, input), soc, interval);
-    const auto h = Model::measurement_jacobian(laws_of(cell), at, input);
-    const Variance variance = state_.soc_variance();
-    const Variance of_soc_v2 =
-        arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
-    const Variance error_v2 = Variance(Variance(at.error_v2 - cell.noise.model_v2) +
-                                       Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state_) +
-                                                drop_variance_v2<S>(at, current_a, constants_.resistance_error())));
-    const Variance innovation_v2 = Variance(Variance(error_v2 + of_soc_v2) + cell.noise.voltage_v2);
-    if (!OutlierGate<S>::is_outlier(innovation_v, innovation_v2)) return false;
-    if (gate_.has_persisted(time_us_, constants_.step_us())) {
-      const Variance finest(1.0 / (SocBank<S>::points * SocBank<S>::points));
-      const SocDistribution<S> before{soc, variance < finest ? finest : variance};
-      ambiguous_.open_at(cell, state_, before.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &before});
-    }
-    return true;
-  }
-
-  template <class Cell>
-  [[gnu::noinline]] constexpr void correct_from_bank(const Cell& cell, Current current_a, Temperature temperature_c,
-                                                     Soc soc, Voltage innovation_v) {
-    const StepInput input{current_a, constants_.duration_s(), temperature_c};
-    ambiguous_.update(cell, input, constants_, soc, innovation_v, interval_, state_);
+    observe(cell, look_up(operating_point(cell, input), soc, interval), input, innovation_v);
+    monitor_.follow(Soc(state_.charge.soc(cell.charge) - soc));
+    return voltage_was_used;
   }
 
   template <class Cell>
@@ -281,14 +280,14 @@ class SocEstimator {
     state_.model_state = {};
     state_.covariance.set_diagonal(unknown);
     errors_ = {};
-    gate_ = {};
-    ambiguous_ = {};
+    monitor_ = {};
     Result estimate;
     estimate.flags = flags | not_a_number;
     report_state(cell, estimate);
     errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
-    ambiguous_.open_at(cell, state_, soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, &soc});
+    monitor_.start(cell);
+    monitor_.bank().open_at(soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
     return estimate;
   }
 
@@ -318,81 +317,30 @@ class SocEstimator {
       return estimate;
     }
     started_ = true;
+    monitor_.start(cell);
     const auto& laws = laws_of(cell);
     const StepInput input{laws.true_current(arithmetic::from_micro<Current>(current.ua)), TimeStep(1),
                           temperature(laws, sample.temperature_cdegc)};
-    const At at = start_state(cell, input, current.measured, voltage ? &sample.voltage_uv : nullptr);
+    const At at =
+        FirstState<S, ModelOf>(state_, monitor_.bank(), interval_)
+            .set(cell, input, current.measured, has_start_ ? &from_ : nullptr, voltage ? &sample.voltage_uv : nullptr);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.model_state, at, input);
     report_state(cell, estimate);
     errors_.start(estimate.soc);
     return estimate;
   }
 
-  /// Sets the state, and opens the bank if the SOC is ambiguous. voltage_uv: nullptr if it is missing. Returns the
-  /// tables at the first SOC.
-  template <class Cell>
-  constexpr At start_state(const Cell& cell, const StepInput& input, bool current_measured,
-                           const std::int32_t* voltage_uv) {
-    SocDistribution<S> soc = given_soc();
-    const auto tables = operating_point(cell, input);
-    At at = look_up(tables, has_start_ ? soc.soc : Soc(0.5), interval_);
-    const StartPolarisation<S> rc = start_polarisation<S>(at, input.current_a, cell.noise);
-    typename Model::Variances variances{};
-    variances[0] = cell.noise.v_rc_v2 + rc.variance_v2;
-    Model::start(laws_of(cell), state_.model_state, variances, at, input, cell.noise);
-    // a start that is finer than the points of the grid needs no help from a voltage
-    if (!has_start_ || soc_of_ppb(from_.soc_sigma_ppb) > Soc(2.0 / start_points)) {
-      const Voltage load_v = rc.v_rc_v + Model::sum_v(state_.model_state) + at.r0_ohm * input.current_a;
-      Variance reading_v2 = cell.noise.rest_v2 + rc.variance_v2;
-      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) reading_v2 = Variance(reading_v2 + variances[k]);
-      if (!current_measured) {
-        const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
-        reading_v2 = Variance(reading_v2 + unknown_v * unknown_v);
-      }
-      const bool voltage = voltage_uv != nullptr;
-      const Voltage ocv_v =
-          voltage ? Voltage(Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v)
-                  : Voltage(0);
-      const SocDistribution<S> before = soc;
-      const StartMisfit<S, decltype(tables)> misfit{tables, voltage ? &ocv_v : nullptr, reading_v2,
-                                                    has_start_ ? &before : nullptr};
-      if (voltage) soc = soc_from(misfit);
-      if (soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma)) {
-        state_.covariance.set_diagonal(variances);  // the bank needs the variances of the other states
-        ambiguous_.open_at(cell, state_, soc.soc, misfit);
-      }
-      at = look_up(tables, soc.soc, interval_);
-    }
-    state_.charge.set(soc.soc, cell.charge);
-    state_.model_state[0] = rc.v_rc_v;
-    variances[Model::soc] = soc.variance;
-    state_.covariance.set_diagonal(variances);
-    return at;
-  }
-
-  static constexpr std::int32_t clamped_to_one(std::int32_t ppb, std::int32_t least = 0) {
-    return std::clamp<std::int32_t>(ppb, least, 1'000'000'000);
-  }
-  constexpr SocDistribution<S> given_soc() const {
-    const Soc sigma = soc_of_ppb(from_.soc_sigma_ppb);
-    return {soc_of_ppb(from_.soc_ppb), Variance(sigma * sigma)};
-  }
-  static constexpr Soc soc_of_ppb(std::int32_t ppb) {
-    return Soc(arithmetic::from_micro<arithmetic::Current<S>>(ppb) * Fraction(1e-3));
-  }
-
   CellState<S, ModelOf> state_;
   InputCheck<S> check_;
   [[no_unique_address]] Errors errors_;
   std::uint64_t time_us_ = 0;
-  std::uint64_t checked_step_us_ = 0;  ///< last step that was not a gap; a step of this length is not checked again
+  std::uint32_t checked_step_us_ = 0;  ///< last step that was not a gap; a step of this length is not checked again
   std::uint8_t interval_ = 0;
   std::int16_t temperature_cdegc_ = static_cast<std::int16_t>(100 * model::assumed_ambient_c);
   std::int16_t temperature_bin_ = no_temperature_bin;
   StepConstants<S, Model, Errors> constants_;
-  AmbiguousSoc<S, ModelOf> ambiguous_;
+  SocMonitor<S, ModelOf> monitor_;
   measurement::StartingPoint from_;
-  OutlierGate<S> gate_;
   bool has_start_ = false, started_ = false;
 };
 

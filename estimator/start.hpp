@@ -4,11 +4,12 @@
 // the OCV curve with a standard deviation. Every SOC from 0 to 1 is weighted by how well its OCV fits; the start is the
 // mean and standard deviation of this distribution. On the plateau that is a wide band, as it should be.
 //
-// Cost: one pass over 256 points, once.
+// Cost: two passes over 256 points, once.
 #pragma once
 
 #include <cstddef>
 
+#include "estimator/soc_bank.hpp"
 #include "estimator/voltage_uncertainty.hpp"
 #include "model/one_rc.hpp"
 
@@ -26,10 +27,22 @@ template <class S>
 struct StartPolarisation {
   arithmetic::Voltage<S> v_rc_v;
   arithmetic::Variance<S> variance_v2;
+  arithmetic::Variance<S> before_v2{};          ///< part of variance_v2 that is from the current before
+  arithmetic::Variance<S> charged_before_v2{};  ///< that part if the current before charged the cell
 };
+
+inline constexpr double rests_below_c = 0.01;  ///< current of a cell at rest, in capacities per hour
+
+template <class S>
+constexpr bool rests(const arithmetic::Current<S>& current_a, const model::FilterNoise<S>& noise) {
+  return arithmetic::magnitude(current_a) <
+         arithmetic::Current<S>(noise.one_c_a * arithmetic::Fraction<S>(rests_below_c));
+}
 
 /// Nobody knows how long the present current has flowed. The RC branch is assumed to be charged to half of its final
 /// voltage, with a standard deviation of the same size; the current before that adds to it (noise.current_unknown_a).
+/// In the cold, chargers reduce their current at least as the resistance increases, so a charge leaves no larger
+/// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full.
 template <class S>
 constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at,
                                                   const arithmetic::Current<S>& current_a,
@@ -37,19 +50,59 @@ constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at
   using namespace model;
   const Voltage<S> half_v = at.r1_ohm * Fraction<S>(0.5) * current_a;
   const Voltage<S> before_v = at.r1_ohm * noise.unknown_a;
-  return {half_v, Variance<S>(half_v * half_v) + Variance<S>(before_v * before_v)};
+  const auto charged_v = rests<S>(current_a, noise) && at.activation > Factor<S>(1)
+                             ? ratio<Voltage<S>>(before_v, Voltage<S>(at.activation))
+                             : before_v;
+  const Variance<S> before_v2 = before_v * before_v;
+  return {half_v, Variance<S>(half_v * half_v) + before_v2, before_v2, charged_v * charged_v};
 }
 
 inline constexpr int start_points = 256;
 
-/// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0.
-template <class S, class Cell>
+/// A prior may be entirely wrong: then every SOC is as probable, and a voltage that clearly contradicts the prior wins.
+/// one_in_a_hundred: how often a first estimate expects that; even_odds: whoever checks a prior takes no side, because
+/// a wrong SOC that lasts is worse than a wide sigma.
+enum class WrongPrior : std::uint8_t { one_in_a_hundred, even_odds };
+
+/// Misfit of a SOC if the prior is wrong, above that of the prior's mean: ln(odds / (sqrt(2 pi) sigma)), >= 0.
+template <class S>
+constexpr arithmetic::Exponent<S> wrong_prior_misfit(const arithmetic::Variance<S>& variance, WrongPrior wrong) {
+  constexpr double of_one_thousandth = 5.9888, of_a_hundred = 4.6052;  // ln(1 / (sqrt(2 pi) 0.001)), ln 100
+  const arithmetic::Current<S> even =
+      arithmetic::Current<S>(arithmetic::Current<S>(of_one_thousandth) - SocBank<S>::half_log(variance));
+  const auto misfit =
+      wrong == WrongPrior::even_odds ? even : arithmetic::Current<S>(even + arithmetic::Current<S>(of_a_hundred));
+  return arithmetic::Exponent<S>(misfit > arithmetic::Current<S>(0) ? misfit : arithmetic::Current<S>(0));
+}
+
+template <class Cell>
+constexpr const auto& noise_of(const Cell& cell) {
+  if constexpr (requires { cell.cell.noise; })
+    return cell.cell.noise;
+  else
+    return cell.noise;
+}
+
+/// Variance of a reading that depends on the SOC: none.
+struct NoMoreVariance {
+  template <class At>
+  constexpr auto operator()(const At& at, bool) const {
+    return decltype(at.error_v2){};
+  }
+};
+
+/// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0. More: variance of the reading that depends on
+/// the SOC, from the tables there and whether the reading is above the curve.
+template <class S, class Cell, class More = NoMoreVariance>
 struct StartMisfit {
   const Cell& cell;
   const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr if it is missing
   arithmetic::Variance<S> variance_v2;  ///< of the reading
+  arithmetic::Variance<S> above_v2;     ///< the same for a reading above the curve
   const SocDistribution<S>*
       before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
+  More more_v2{};
+  WrongPrior wrong = WrongPrior::one_in_a_hundred;
 
   /// half_step: half the spacing of the points for which this is called.
   constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,
@@ -59,22 +112,25 @@ struct StartMisfit {
     if (ocv_v != nullptr) {
       const auto at = look_up(cell, soc, interval);
       const Voltage<S> off_v = *ocv_v - at.ocv_v;
+      const bool above = off_v > Voltage<S>(0);
+      const Variance<S> one_v2 = Variance<S>(Variance<S>((above ? above_v2 : variance_v2) + more_v2(at, above)) +
+                                             soc_axis_variance<S>(cell, noise_of(cell), at, soc, off_v));
       // half a point's width on the curve counts as uncertainty as well: steep parts have few points
       const Voltage<S> half_width_v = product<Voltage<S>>(ocv_slope<S>(at), half_step);
-      const Variance<S> two_variances = variance_v2 + variance_v2 + product<Variance<S>>(half_width_v, half_width_v);
+      const Variance<S> two_variances = one_v2 + one_v2 + product<Variance<S>>(half_width_v, half_width_v);
       misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
     }
     if (before == nullptr) return misfit;
     const Soc<S> off = soc - before->soc;
     const auto of_prior = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const Exponent<S> most(8);  // one prior in 3,000 is entirely wrong: a voltage that clearly contradicts it wins
+    const auto most = wrong_prior_misfit<S>(before->variance, wrong);
     return Exponent<S>(misfit + (of_prior < most ? of_prior : most));
   }
 };
 
 /// Mean and variance of the SOC, weighted by exp(-misfit).
-template <class S, class Cell>
-constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& misfit_of) {
+template <class S, class Cell, class More>
+constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell, More>& misfit_of) {
   using namespace model;
   constexpr int points = start_points;
   const Fraction<S> spacing(1.0 / points), half_step(0.5 / points);
@@ -83,24 +139,26 @@ constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell>& misfit_of) {
   const auto misfit = [&](int k) { return misfit_of(point(k), half_step, interval); };
   // the smallest misfit is subtracted from all, so that a voltage outside the curve still has weights
   Exponent<S> least = misfit(0);
+  Soc<S> best = point(0);
   for (int k = 1; k < points; ++k) {
     const Exponent<S> m = misfit(k);
-    if (m < least) least = m;
+    if (!(m < least)) continue;
+    least = m;
+    best = point(k);
   }
   Variance<S> weights{}, first{}, second{};  // the widest type: sums of 256 weights of at most 1/256
   for (int k = 0; k < points; ++k) {
     const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
+    const Soc<S> off = point(k) - best;
     weights = Variance<S>(weights + weight);
     first = Variance<S>(first + weight * point(k));
-  }
-  const Soc<S> mean = ratio<Soc<S>>(first, weights);
-  for (int k = 0; k < points; ++k) {
-    const Soc<S> off = point(k) - mean;
-    const Fraction<S> weight = (Fraction<S>(1) - step_response<S>(Exponent<S>(misfit(k) - least))) * spacing;
     second = Variance<S>(second + weight * Fraction<S>(off * off));
   }
+  const Soc<S> mean = ratio<Soc<S>>(first, weights), off = mean - best;
+  const Variance<S> about_mean = Variance<S>(Variance<S>(ratio<Fraction<S>>(second, weights)) - Variance<S>(off * off));
   // the spacing of the points limits the accuracy
-  const Variance<S> variance = Variance<S>(ratio<Fraction<S>>(second, weights)) + Variance<S>(spacing * spacing);
+  const Variance<S> variance =
+      (about_mean > Variance<S>(0) ? about_mean : Variance<S>(0)) + Variance<S>(spacing * spacing);
   return {mean, variance};
 }
 

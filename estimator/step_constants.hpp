@@ -24,6 +24,7 @@ class StepConstants {
   using Coupling = arithmetic::Coupling<S>;
   using Temperature = arithmetic::Temperature<S>;
   using Factor = arithmetic::Factor<S>;
+  using TimeStep = arithmetic::TimeStep<S>;
 
  public:
   /// Range of TimeStep. The RC branch has settled after that.
@@ -58,16 +59,21 @@ class StepConstants {
     error_decay_ = Model::error_decay(noise, duration_s_);
   }
 
-  /// In the cold, resistances are larger than a cell file says that does not follow the temperature. The filter adds
-  /// the increase to their uncertainty (model::assumed_activation_j_per_mol).
+  /// Outside of the temperatures of the identification the overpotential is less certain. In the cold, resistances are
+  /// also larger than a cell file says that does not follow the temperature: the filter adds that increase
+  /// (model::assumed_activation_j_per_mol).
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     resistance_error_ = Coupling(cell.noise.resistance_error);
-    if (measurement::temperature_possible(cdegc) && cdegc < cell.reference.cdegc &&
-        !laws_of(cell).resistances_follow_temperature()) {
-      const auto factor = model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c,
-                                                                arithmetic::from_centi<Temperature>(cdegc));
-      resistance_error_ = Coupling(resistance_error_ + Coupling(factor - Factor(1)));
+    if (measurement::temperature_possible(cdegc)) {
+      const auto c = arithmetic::from_centi<Temperature>(cdegc);
+      if (laws_of(cell).resistances_follow_temperature())
+        resistance_error_ = Coupling(resistance_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
+      else if (cdegc < cell.reference.cdegc)
+        resistance_error_ =
+            Coupling(resistance_error_ + Coupling(model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt,
+                                                                                        cell.reference.c, c) -
+                                                  Factor(1)));
     }
     update_resistance_noise();
   }
@@ -81,6 +87,17 @@ class StepConstants {
   }
 
  private:
+  /// Relative error of the overpotential: tolerance.resistance_per_ev times |1 / kT - 1 / kT_edge|.
+  static constexpr Coupling extrapolation_error(const model::IdentifiedTemperatures<S>& identified, std::int16_t cdegc,
+                                                const Temperature& c) {
+    const bool colder = cdegc<identified.min_cdegc, hotter = cdegc> identified.max_cdegc;
+    if (!colder && !hotter) return Coupling(0);
+    const Temperature kelvin = c + Temperature(273.15);
+    const Temperature beyond = colder ? Temperature(identified.min_c - c) : Temperature(c - identified.max_c);
+    return Coupling(
+        Factor((colder ? identified.per_colder : identified.per_hotter) * arithmetic::ratio<Fraction>(beyond, kelvin)));
+  }
+
   constexpr void update_resistance_noise() {
     resistance_noise_ =
         arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);

@@ -2,8 +2,8 @@
 // of both.
 #pragma once
 
-#include <concepts>
-#include <type_traits>
+#include <cstddef>
+#include <cstdint>
 
 #include "model/extended_rc.hpp"
 
@@ -33,20 +33,44 @@ constexpr arithmetic::Variance<S> drop_variance_v2(const model::TablePoint<S>& a
   return sigma_v * sigma_v;
 }
 
-/// Variance of the OCV from the uncertainty of the tables' SOC axis (tolerance.initial_soc). In the cold, the surface
-/// of the particles is further ahead of the counted charge, in proportion to the resistances; knees then come
-/// elsewhere.
-template <class S, class Cell>
-constexpr arithmetic::Variance<S> soc_axis_variance(const Cell& cell, const model::TablePoint<S>& at) {
-  using Variance = arithmetic::Variance<S>;
-  const Variance at_reference = Variance(at.error_v2 - cell.noise.model_v2);
-  if constexpr (std::same_as<std::remove_cvref_t<decltype(laws_of(cell))>, model::LawSet<S>>)
-    return at_reference;
-  else
-    return at.activation > arithmetic::Factor<S>(1)
-               ? arithmetic::product<Variance>(arithmetic::product<Variance>(at_reference, at.activation),
-                                               at.activation)
-               : at_reference;
+/// Variance that those states before the SOC for which counts(k) is true give a voltage, as if they were independent.
+/// h: measurement Jacobian.
+template <class Model, class Counts>
+constexpr auto sum_variance(const typename Model::Variances& variances, const typename Model::MeasurementJacobian& h,
+                            Counts&& counts) {
+  using Variance = typename Model::Variances::value_type;
+  Variance sum{};
+  for (std::size_t k = 0; k < Model::soc; ++k) {
+    if (counts(k))
+      sum = Variance(sum + arithmetic::product<Variance>(arithmetic::product<Variance>(variances[k], h[k]), h[k]));
+  }
+  return sum;
+}
+
+/// Variance of the OCV from the uncertainty of the tables' SOC axis (tolerance.initial_soc).
+template <class S>
+constexpr arithmetic::Variance<S> soc_axis_variance(const model::FilterNoise<S>& noise,
+                                                    const model::TablePoint<S>& at) {
+  return arithmetic::Variance<S>(at.error_v2 - noise.model_v2);
+}
+
+/// The same for a deviation off_v of a voltage from `at` that may be large. The curve is steep over few per cent only,
+/// so its secant over three standard deviations of the axis counts, on the side of the deviation, and from empty to
+/// full. at: of `tables` at soc.
+template <class S, class Tables>
+constexpr arithmetic::Variance<S> soc_axis_variance(const Tables& tables, const model::FilterNoise<S>& noise,
+                                                    const model::TablePoint<S>& at, const arithmetic::Soc<S>& soc,
+                                                    const arithmetic::Voltage<S>& off_v) {
+  using namespace arithmetic;
+  constexpr double sigmas = 3;
+  const bool below = off_v < Voltage<S>(0);
+  const Soc<S> end(below ? 0 : 1), three = Soc<S>(noise.soc_axis + noise.soc_axis + noise.soc_axis);
+  if (below ? !(soc > end) : !(soc < end)) return Variance<S>{};
+  Soc<S> there = below ? Soc<S>(soc - three) : Soc<S>(soc + three);
+  if (below ? there < end : there > end) there = end;
+  std::uint8_t interval = 0;
+  const Voltage<S> sigma_v = Voltage<S>(look_up(tables, there, interval).ocv_v - at.ocv_v) * Fraction<S>(1 / sigmas);
+  return sigma_v * sigma_v;
 }
 
 }  // namespace bms::estimator

@@ -74,7 +74,8 @@ template <class S>
 constexpr std::uint32_t soc_quality(const estimator::Estimate<S>& e, bool observable) {
   using M = can::PackState;
   if ((e.flags & estimator::not_started) != 0) return M::soc_quality_not_started;
-  if ((e.flags & estimator::voltage_rejected) != 0) return M::soc_quality_the_voltage_contradicts;
+  if ((e.flags & (estimator::voltage_rejected | estimator::soc_contradicted)) != 0)
+    return M::soc_quality_the_voltage_contradicts;
   if ((e.flags & estimator::soc_ambiguous) != 0) return M::soc_quality_more_than_one_state_of_charge_fits;
   return observable ? M::soc_quality_determined_by_the_voltage : M::soc_quality_carried_by_counting;
 }

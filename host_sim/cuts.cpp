@@ -129,6 +129,8 @@ void sum_up(CutFigures& f, const std::vector<Errors>& errors) {
     for (std::size_t i = 0; i < 3; ++i) f.inside[i] += run.inside[i] * static_cast<double>(run.rows);
     rows += static_cast<double>(run.rows);
     f.worst_inside = std::min(f.worst_inside, run.inside[1]);
+    for (std::size_t i = 0; i < cut_inside_limits.size(); ++i)
+      f.cuts_below[i] += run.inside[1] < cut_inside_limits[i] ? 1 : 0;
     if (!std::isnan(run.rmse_after_knee)) after_knee.push_back(run.rmse_after_knee);
     if (const auto in_time = recovered_in_time(run)) {
       judged += 1;
@@ -222,8 +224,9 @@ CutResult run_cuts(const files::CellFile& cell, const measurement::Recording& re
 
 std::string cut_heading() {
   return "| recording | start | median RMSE after 5, 30, 120 min, % | worst RMSE, % | largest error, % | after a knee, "
-         "30 min, % | inside one, two, three sigma, % | worst cut, two sigma, % | median of error / sigma | median "
-         "sigma, % | recovered in time, % |\n|---|---|---|---|---|---|---|---|---|---|---|\n";
+         "30 min, % | inside one, two, three sigma, % | worst cut, two sigma, % | cuts below 70, 90 % | median of "
+         "error / sigma | median "
+         "sigma, % | recovered in time, % |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n";
 }
 
 std::string cut_rows(const CutResult& result) {
@@ -240,12 +243,46 @@ std::string cut_rows(const CutResult& result) {
   std::string rows;
   for (const CutFigures& f : result.starts) {
     rows += fmt::format(
-        "| {} | {} | {} | {} | {} | {} | {} | {:.0f} | {:.2f} | {:.2f} | {:.0f} |\n", name, f.start.title,
-        three(f.median_rmse, "{:.2f}"), three(f.worst_rmse, "{:.1f}"), three(f.largest, "{:.1f}"),
+        "| {} | {} | {} | {} | {} | {} | {} | {:.0f} | {}, {} of {} | {:.2f} | {:.2f} | {:.0f} |\n", name,
+        f.start.title, three(f.median_rmse, "{:.2f}"), three(f.worst_rmse, "{:.1f}"), three(f.largest, "{:.1f}"),
         std::isnan(f.median_rmse_after_knee) ? "-" : fmt::format("{:.2f}", 100 * f.median_rmse_after_knee),
-        three(f.inside, "{:.0f}"), 100 * f.worst_inside, f.median_ratio, 100 * f.median_sigma, 100 * f.recovered);
+        three(f.inside, "{:.0f}"), 100 * f.worst_inside, f.cuts_below[0], f.cuts_below[1], f.runs.size(),
+        f.median_ratio, 100 * f.median_sigma, 100 * f.recovered);
   }
   return rows;
+}
+
+std::string cut_summary(const std::vector<CutResult>& results) {
+  std::string table =
+      "| start | cuts | median RMSE after 5, 30, 120 min, % | inside one, two, three sigma, % | cuts below 70, 90 % | "
+      "median of error / sigma | median sigma, % | recovered in time |\n|---|---|---|---|---|---|---|---|\n";
+  for (std::size_t s = 0; s < cut_starts.size(); ++s) {
+    std::array<std::vector<double>, 3> rmse, inside;
+    std::vector<double> ratio, sigma;
+    std::size_t judged = 0, recovered = 0;
+    std::array<std::size_t, 2> below{};
+    for (const CutResult& result : results) {
+      for (const CutRun& run : result.starts[s].runs) {
+        for (std::size_t i = 0; i < 3; ++i) {
+          rmse[i].push_back(run.rmse[i]);
+          inside[i].push_back(run.inside[i]);
+        }
+        ratio.push_back(run.median_ratio);
+        sigma.push_back(run.median_sigma);
+        const auto in_time = recovered_in_time(run);
+        judged += in_time ? 1 : 0;
+        recovered += in_time.value_or(false) ? 1 : 0;
+        for (std::size_t i = 0; i < below.size(); ++i) below[i] += run.inside[1] < cut_inside_limits[i] ? 1 : 0;
+      }
+    }
+    table += fmt::format(
+        "| {} | {} | {:.2f}, {:.2f}, {:.2f} | {:.0f}, {:.0f}, {:.0f} | {}, {} | {:.2f} | {:.2f} | {} of {} |\n",
+        cut_starts[s].title, ratio.size(), 100 * measurement::median(rmse[0]), 100 * measurement::median(rmse[1]),
+        100 * measurement::median(rmse[2]), 100 * measurement::mean(inside[0]), 100 * measurement::mean(inside[1]),
+        100 * measurement::mean(inside[2]), below[0], below[1], measurement::median(ratio),
+        100 * measurement::median(sigma), recovered, judged);
+  }
+  return table;
 }
 
 }  // namespace bms::host_sim

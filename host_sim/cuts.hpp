@@ -31,6 +31,9 @@ inline constexpr std::array cut_starts{CutStart{"right", "right, sigma 2 %", tru
 /// Times after a cut from which errors are counted [s].
 inline constexpr std::array<double, 3> cut_from_s{300, 1'800, 7'200};
 
+/// Shares of the rows inside two sigma below which a run is counted.
+inline constexpr std::array<double, 2> cut_inside_limits{0.7, 0.9};
+
 /// The run from one cut to the end of the recording.
 struct CutRun {
   double from_s = 0;  ///< time of the cut in the recording
@@ -53,7 +56,8 @@ struct CutFigures {
   double median_rmse_after_knee = std::numeric_limits<double>::quiet_NaN();  ///< of CutRun::rmse_after_knee
   std::array<double, 3> inside{};                                            ///< over all rows of all runs
   double worst_inside = 0;                                                   ///< two sigma, of the worst run
-  double median_ratio = 0;  ///< median of |error| / sigma over all rows of all runs
+  std::array<std::size_t, 2> cuts_below{};  ///< runs with a smaller share inside two sigma than cut_inside_limits
+  double median_ratio = 0;                  ///< median of |error| / sigma over all rows of all runs
   double median_sigma = 0;
   /// Share of the runs that are inside two sigma again within half an hour of the first knee or four hours of the
   /// cut. A run that ends before both, and is not, does not count.
@@ -78,5 +82,8 @@ CutResult run_cuts(const files::CellFile& cell, const measurement::Recording& re
 /// Heading and rows of a Markdown table: one row for each start.
 std::string cut_heading();
 std::string cut_rows(const CutResult& result);
+
+/// Markdown: one row for each start over the cuts of all results. Each cut counts once.
+std::string cut_summary(const std::vector<CutResult>& results);
 
 }  // namespace bms::host_sim

@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "identification/residuals.hpp"
+#include "identification/variance_parts.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::identification {
@@ -241,24 +242,30 @@ void add_left_out(const JointModel& model, const Fold& fold, const JointFit& fit
 ModelErrors errors_of(const std::vector<LeftOutError>& all) {
   const bool any_between =
       std::any_of(all.begin(), all.end(), [](const LeftOutError& e) { return e.beyond_per_ev == 0; });
-  std::vector<double> resistance, soc, rest, correlation;
+  std::vector<double> resistance, soc, rest, overpotential, correlation;
   for (const LeftOutError& e : all) {
     if (any_between && e.beyond_per_ev > 0) continue;
     resistance.push_back(e.resistance_error);
     soc.push_back(e.soc_error);
     rest.push_back(e.rest_v);
+    overpotential.push_back(e.overpotential_v);
     correlation.push_back(e.correlation_s);
   }
   ModelErrors errors;
-  errors.resistance_fraction = measurement::rms(resistance);
+  // the residual is larger under a larger load and in the cold: that part is an error of the overpotential as well
+  const VarianceParts remaining = variance_parts(rest, overpotential);
+  errors.resistance_fraction = std::hypot(measurement::rms(resistance), remaining.per);
   errors.initial_soc = measurement::rms(soc);
-  errors.model_v = measurement::rms(rest);
+  errors.model_v = remaining.constant;
   errors.correlation_s =
       std::accumulate(correlation.begin(), correlation.end(), 0.0) / static_cast<double>(correlation.size());
   std::vector<double> per_ev;
   for (const LeftOutError& e : all) {
-    const double more = std::pow(e.resistance_error, 2) - std::pow(errors.resistance_fraction, 2);
-    if (e.beyond_per_ev > 0) per_ev.push_back(std::sqrt(std::max(0.0, more)) / e.beyond_per_ev);
+    if (!(e.beyond_per_ev > 0)) continue;
+    const double of_rest = std::max(0.0, std::pow(e.rest_v, 2) - std::pow(errors.model_v, 2)) /
+                           std::max(1e-12, std::pow(e.overpotential_v, 2));
+    const double more = std::pow(e.resistance_error, 2) + of_rest - std::pow(errors.resistance_fraction, 2);
+    per_ev.push_back(std::sqrt(std::max(0.0, more)) / e.beyond_per_ev);
   }
   errors.resistance_per_ev = measurement::rms(per_ev);
   return errors;
@@ -371,6 +378,9 @@ LeftOutError left_out_error(const JointModel& model, const JointRecording& recor
   Eigen::VectorXd rest(static_cast<Eigen::Index>(error_v.size()));
   for (std::size_t k = 0; k < by.size(); ++k) rest[static_cast<Eigen::Index>(k)] = error_v[k] - by[k].dot(x);
   found.rest_v = std::sqrt(rest.squaredNorm() / n);
+  double overpotential_v2 = 0;
+  for (const Eigen::Vector2d& at_row : by) overpotential_v2 += at_row[0] * at_row[0];
+  found.overpotential_v = std::sqrt(overpotential_v2 / n);
   found.correlation_s = correlation_length(rest) * duration_s / static_cast<double>(recording.data.size() - 1);
   return found;
 }

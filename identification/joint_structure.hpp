@@ -42,6 +42,7 @@ struct LeftOutError {
   double resistance_error = 0;  ///< relative error of the modelled overpotential
   double soc_error = 0;         ///< error of the SOC axis
   double rest_v = 0;            ///< RMS of what is neither of the two
+  double overpotential_v = 0;   ///< RMS of the modelled one
   double correlation_s = 0;     ///< over which that rest is correlated
   double beyond_per_ev = 0;     ///< distance in 1 / (k T) to the temperatures of the fit [1/eV]; 0: between them
 };

@@ -12,8 +12,8 @@
 //   values       v_rc, voltage error, current offset, mechanisms' states             (the SOC is counted separately)
 //
 // A mechanism's state depends on itself and on the current only: x' = x + alpha (target - x), d x' / d x = 1 - alpha,
-// no derivative by SOC (that of a resistance that follows the SOC is neglected). The laws' effect on the tables enters
-// through the tables' own derivatives. ExtendedRc<0, 0> is OneRc.
+// no derivative by SOC. The laws' effect on the tables enters through the tables' own derivatives. ExtendedRc<0, 0> is
+// OneRc.
 //
 // The laws come with the cell: a Cell has no laws, an ExtendedCell has those of its file.
 #pragma once
@@ -274,7 +274,50 @@ struct ExtendedRc {
       }
     }
 
+    /// Voltages of the RC pair and of the mechanisms' voltage states that a lasting current causes: what a polarisation
+    /// scales with.
+    template <class SomeLaws>
+    static constexpr std::array<Voltage<S>, 1 + Voltages> final_voltages(const SomeLaws& laws, const State& x,
+                                                                         const TablePoint<S>& at,
+                                                                         const StepInput<S>& input) {
+      std::array<Voltage<S>, 1 + Voltages> v{};
+      v[0] = Voltage<S>(at.r1_ohm * input.current_a);
+      if constexpr (Voltages > 0) {
+        const auto discretisation = laws.discretise(mechanism_states(x), at, input);
+        for (std::size_t k = 0; k < Voltages; ++k) v[1 + k] = discretisation[k].target;
+      }
+      return v;
+    }
+    /// Whether state k of the covariance, before the SOC, relaxes with a time constant.
+    template <class SomeLaws>
+    static constexpr bool is_polarisation(const SomeLaws& laws, std::size_t k) {
+      return k == 0 || (k >= first_voltage && !laws.starts_with_own_sigma(k - first_voltage));
+    }
+    /// Polarisation x at one SOC, as it would be at another one. here, there: final_voltages() at both.
+    static constexpr State polarisation_at(State x, const std::array<Voltage<S>, 1 + Voltages>& here,
+                                           const std::array<Voltage<S>, 1 + Voltages>& there) {
+      for (std::size_t k = 0; k <= Voltages; ++k) {
+        if (here[k] == there[k]) continue;
+        Voltage<S>& v = x[k == 0 ? 0 : first_mechanism_state + k - 1];
+        v = scaled_by(v, there[k], here[k]);
+      }
+      return x;
+    }
+
    private:
+    /// v times numerator / denominator, both of the same sign; 2 V at most.
+    static constexpr Voltage<S> scaled_by(const Voltage<S>& v, const Voltage<S>& numerator,
+                                          const Voltage<S>& denominator) {
+      constexpr double most_v = 2, most_times = 16;
+      const Voltage<S> size = v < Voltage<S>(0) ? Voltage<S>(-v) : v, most(most_v);
+      const Voltage<S> up = numerator < Voltage<S>(0) ? Voltage<S>(-numerator) : numerator;
+      const Voltage<S> down = denominator < Voltage<S>(0) ? Voltage<S>(-denominator) : denominator;
+      const bool large = !(Voltage<S>(up * Fraction<S>(1 / most_times)) < down);
+      const Factor<S> times = large ? Factor<S>(most_times) : ratio<Factor<S>>(up, down);
+      const Factor<S> wide = Factor<S>((size < most ? size : most) * times);
+      const Voltage<S> result = wide < Factor<S>(most_v) ? Voltage<S>(wide) : most;
+      return v < Voltage<S>(0) ? Voltage<S>(-result) : result;
+    }
     /// At least (1 uV)^2: a mechanism of strength 0 would make its state certain, and the filter divide 0 by 0.
     static constexpr Variance<S> uncertain(const Variance<S>& variance) {
       const auto least = Variance<S>(1e-12);

@@ -38,6 +38,7 @@ struct FilterNoise {
   Variance<S> model_v2{};             ///< the part of Interval::error_v2 that does not depend on the SOC
   Duration<S> model_correlation_s{};  ///< correlation time of Interval::error_v2 and of the resistance error
   Fraction<S> resistance_error{};     ///< relative standard deviation of the overpotential
+  Soc<S> soc_axis{};                  ///< standard deviation of the tables' SOC axis
   IdentifiedTemperatures<S> identified;
   Variance<S> v_rc_v2{};  ///< in the steady state
   Variance<S> rest_v2{};
@@ -80,6 +81,7 @@ constexpr FilterNoise<S> filter_noise(const CellParameters<Real>& p, double capa
   f.model_v2 = Variance<S>(square(n.model_v));
   f.model_correlation_s = Duration<S>(n.model_correlation_s);
   f.resistance_error = Fraction<S>(p.tolerance.resistance_fraction);
+  f.soc_axis = Soc<S>(p.tolerance.initial_soc);
   f.identified = identified_temperatures<S>(p);
   f.v_rc_v2 = Variance<S>(square(n.v_rc_v));
   f.rest_v2 = Variance<S>(square(n.rest_v));

@@ -231,6 +231,14 @@ class LawSet {
       }
     });
   }
+  /// Whether voltage state k has a sigma of its own at the start: it is not a polarisation.
+  constexpr bool starts_with_own_sigma(std::size_t k) const {
+    bool own = false;
+    each_with_states([&](const auto& law, std::size_t first) {
+      if constexpr (requires { law.initial_sigma_v(); }) own = own || (k >= first && k < first + states_of(law));
+    });
+    return own;
+  }
   /// Advances the states if `moving`. Returns the sum of the voltage states.
   constexpr Voltage<S> advance(States& x, const TablePoint<S>& at, const StepInput<S>& input, bool moving) const {
     Voltage<S> sum(0);

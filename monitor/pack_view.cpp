@@ -26,6 +26,8 @@ constexpr std::pair<estimator::Flag, const char*> flag_texts[] = {
     {estimator::not_started, "not started"},
     {estimator::soc_ambiguous, "more than one state of charge fits"},
     {estimator::voltage_rejected, "voltage rejected"},
+    {estimator::soc_contradicted, "voltages contradicted the state of charge"},
+    {estimator::current_beyond_limits, "current beyond the limits of the cell file"},
     {estimator::not_a_number, "not a number"}};
 
 std::vector<TextItem> flag_items(const Reading& flags) {

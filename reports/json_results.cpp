@@ -50,6 +50,7 @@ std::string json_of(const host_sim::CutResult& r) {
   json["cell"] = r.cell;
   json["cuts"] = r.cuts;
   json["from_s"] = host_sim::cut_from_s;
+  json["within_2_sigma_limits"] = host_sim::cut_inside_limits;
   json["starts"] = Json::array();
   for (const host_sim::CutFigures& f : r.starts) {
     Json start = {{"start", f.start.id},
@@ -59,6 +60,7 @@ std::string json_of(const host_sim::CutResult& r) {
                   {"median_rmse_after_knee", f.median_rmse_after_knee},
                   {"within_sigmas", f.inside},
                   {"worst_within_2_sigma", f.worst_inside},
+                  {"cuts_below", f.cuts_below},
                   {"median_error_over_sigma", f.median_ratio},
                   {"median_sigma", f.median_sigma},
                   {"recovered", f.recovered}};
@@ -199,6 +201,7 @@ Json left_out_of(const identification::LeftOutError& e) {
           {"resistance_error", e.resistance_error},
           {"soc_error", e.soc_error},
           {"rest_v", e.rest_v},
+          {"overpotential_v", e.overpotential_v},
           {"correlation_s", e.correlation_s},
           {"beyond_per_ev", e.beyond_per_ev}};
 }

@@ -179,7 +179,8 @@ id::FitStatistics compare(const files::CellFile& cell, const IdentificationData&
 }
 
 void put_noise(const id::ModelErrors& errors, model::CellParameters<>& p) {
-  constexpr double least_v = 0.003;  // a minor hysteresis loop that the recordings need not have shown
+  // minor hysteresis loops that the recordings need not have shown: a quarter of an LFP cell's half gap
+  constexpr double least_v = 0.005;
   p.noise.model_v = std::clamp(errors.model_v, least_v, 0.2);
   // until the current has reversed for a large part of an hour
   p.noise.model_correlation_s = std::clamp(errors.correlation_s, 600.0, 20'000.0);

@@ -67,10 +67,13 @@ inline constexpr std::array flag_texts = {
     FlagText{Flag::current_implausible, "the current is outside the range that the cell can have"},
     FlagText{Flag::time_gap, "a gap: more than ten times the usual step since the last sample"},
     FlagText{Flag::time_not_increasing, "the time does not increase; the sample was ignored"},
+    FlagText{Flag::current_beyond_limits,
+             "the current is beyond the limits of the cell file, but it lasts: it is used"},
     FlagText{Flag::not_started, "no usable voltage yet and no starting point"},
     FlagText{Flag::soc_ambiguous, "more than one state of charge fits the voltages so far"},
     FlagText{Flag::voltage_rejected, "the voltage contradicts the model and was not used"},
     FlagText{Flag::not_a_number, "a result was not a number; the estimator has started again"},
+    FlagText{Flag::soc_contradicted, "the voltages contradicted the state of charge; it is estimated again"},
 };
 
 static_assert(std::uint32_t{GREYBOX_VOLTAGE_MISSING} == Flag::voltage_missing &&
@@ -80,10 +83,12 @@ static_assert(std::uint32_t{GREYBOX_VOLTAGE_MISSING} == Flag::voltage_missing &&
               std::uint32_t{GREYBOX_CURRENT_IMPLAUSIBLE} == Flag::current_implausible &&
               std::uint32_t{GREYBOX_TIME_GAP} == Flag::time_gap &&
               std::uint32_t{GREYBOX_TIME_NOT_INCREASING} == Flag::time_not_increasing &&
+              std::uint32_t{GREYBOX_CURRENT_BEYOND_LIMITS} == Flag::current_beyond_limits &&
               std::uint32_t{GREYBOX_NOT_STARTED} == Flag::not_started &&
               std::uint32_t{GREYBOX_SOC_AMBIGUOUS} == Flag::soc_ambiguous &&
               std::uint32_t{GREYBOX_VOLTAGE_REJECTED} == Flag::voltage_rejected &&
-              std::uint32_t{GREYBOX_NOT_A_NUMBER} == Flag::not_a_number);
+              std::uint32_t{GREYBOX_NOT_A_NUMBER} == Flag::not_a_number &&
+              std::uint32_t{GREYBOX_SOC_CONTRADICTED} == Flag::soc_contradicted);
 static_assert(GREYBOX_NO_READING == no_reading && GREYBOX_NO_TEMPERATURE == no_temperature);
 
 }  // namespace greybox::c_interface

@@ -27,8 +27,9 @@ FitFailed.__doc__ = "The data are good, but no parameters follow from them."
 #: Why an estimate is less accurate than usual: bits of Estimate.flags.
 FLAGS = {
     "voltage_missing": 1 << 0, "voltage_implausible": 1 << 1, "voltage_stuck": 1 << 2, "current_missing": 1 << 3,
-    "current_implausible": 1 << 4, "time_gap": 1 << 5, "time_not_increasing": 1 << 6, "not_started": 1 << 8,
-    "soc_ambiguous": 1 << 9, "voltage_rejected": 1 << 10, "not_a_number": 1 << 11,
+    "current_implausible": 1 << 4, "time_gap": 1 << 5, "time_not_increasing": 1 << 6,
+    "current_beyond_limits": 1 << 7, "not_started": 1 << 8, "soc_ambiguous": 1 << 9, "voltage_rejected": 1 << 10,
+    "not_a_number": 1 << 11, "soc_contradicted": 1 << 12,
 }
 
 _COLUMNS = ("time_s", "current_a", "voltage_v", "temperature_c", "soc_ref")

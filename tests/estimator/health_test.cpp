@@ -80,7 +80,8 @@ TYPED_TEST(HealthOfEveryScalar, FindsTheResistanceThatHasGrown) {
   for (const double more : {0.0, 0.3, 0.6}) {
     const Day<TypeParam> day(6, more * 0.0133, 1);
     const auto found = day.resistance.health();
-    EXPECT_NEAR(arithmetic::as_double(found.ratio), 1 + more, 0.05) << more;
+    // voltages of such a cell contradict the SOC: R0 is then read at one where it differs by up to a tenth
+    EXPECT_NEAR(arithmetic::as_double(found.ratio), 1 + more, 0.02 + 0.1 * more) << more;
     EXPECT_LT(arithmetic::as_double(found.sigma), 0.03) << more;
   }
 }

@@ -22,6 +22,28 @@ TEST(InputCheck, ReplacesAnImplausibleCurrentByTheLastAcceptedOne) {
   EXPECT_EQ(flags, current_implausible);
 }
 
+TEST(InputCheck, UsesACurrentBeyondTheLimitsThatLastsAndFlagsIt) {
+  InputCheck<float> check;
+  for (int k = 1; k <= 20; ++k) {
+    std::uint32_t flags = 0;
+    const AcceptedCurrent a = check.current(-90'000'000 + k, plausible, flags);
+    EXPECT_EQ(a.measured, k >= 5);
+    EXPECT_EQ(flags, k >= 5 ? current_beyond_limits : current_implausible);
+    EXPECT_EQ(a.ua, k >= 5 ? -90'000'000 + k : 0);
+  }
+}
+
+TEST(InputCheck, SpikesOfEitherSignOrBetweenGoodReadingsDoNotLast) {
+  InputCheck<float> check;
+  for (int k = 0; k < 20; ++k) {
+    std::uint32_t flags = 0;
+    EXPECT_FALSE(check.current(k % 2 == 0 ? 90'000'000 : -90'000'000, plausible, flags).measured);
+    if (k % 3 == 0) {
+      EXPECT_TRUE(check.current(1'000'000, plausible, flags).measured);
+    }
+  }
+}
+
 TEST(InputCheck, DistinguishesAMissingVoltageFromAnImplausibleOne) {
   InputCheck<float> check;
   std::uint32_t flags = 0;

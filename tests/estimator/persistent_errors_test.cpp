@@ -32,11 +32,12 @@ TEST(PersistentErrors, ASlowErrorOfTheCurrentIsNoiseOnlyWhereItIsNoState) {
   EXPECT_EQ(AsStates::model_error_in_bank(noise), 0);
 }
 
-TEST(PersistentErrors, AsStatesAQuarterOfTheModelsVarianceStaysNoise) {
+/// The error of the SOC axis lasts as long as the voltage error that is a state: 8 correlation times.
+TEST(PersistentErrors, AsStatesAQuarterOfTheModelsVarianceStaysNoiseAndTheAxisCountsOnce) {
   const auto noise = tests::prepared<double>().noise;
   const auto axis = [] { return 4e-6; };
   EXPECT_EQ(InSigma::error_in_noise(noise, 9e-6, axis), 9e-6);
-  EXPECT_EQ(AsStates::error_in_noise(noise, 9e-6, axis), noise.model_v2 / 4 + 4e-6);
+  EXPECT_EQ(AsStates::error_in_noise(noise, 9e-6, axis), noise.model_v2 / 4 + 8 * 4e-6);
 }
 
 TEST(PersistentErrors, AGainErrorGrowsWithTheCountedChargeAndStaysWhenItComesBack) {

@@ -10,7 +10,8 @@
 
 namespace bms::tests {
 
-template <class S, class Covariance>
+/// Lasting: whether the overpotential of the last half hour counts, as the estimator's monitor has it.
+template <class S, class Covariance, bool Lasting = true>
 class ReferenceFilter {
   using Model = typename model::ExtendedRc<0, 0>::template Of<S>;
 
@@ -35,10 +36,13 @@ class ReferenceFilter {
     x_ = Model::advance(x_, at, discretisation, input);
 
     const S correlated = cell.noise.model_correlation_s / duration_s, samples = correlated > S(1) ? correlated : S(1);
-    const S drop_v2 = estimator::drop_variance_v2<S>(at, current_a, cell.noise.resistance_error);
-    const auto correction = covariance_.observe(Model::measurement_jacobian(laws, at, input),
-                                                cell.noise.voltage_v2 + (at.error_v2 + drop_v2) * samples,
-                                                voltage_v - Model::voltage(laws, x_, at, input));
+    const S predicted_v = Model::voltage(laws, x_, at, input), overpotential_v = predicted_v - at.ocv_v;
+    const S error = cell.noise.resistance_error, drop_v2 = estimator::drop_variance_v2<S>(at, current_a, error);
+    if constexpr (Lasting) watch(overpotential_v, duration_s);
+    const auto correction = covariance_.observe(
+        Model::measurement_jacobian(laws, at, input),
+        cell.noise.voltage_v2 + (at.error_v2 + drop_v2 + lasting_v_ * lasting_v_ * error * error) * samples,
+        voltage_v - predicted_v);
     x_[0] += correction[0];
     soc_ += correction[Model::soc];
     return soc_;
@@ -48,9 +52,22 @@ class ReferenceFilter {
   S v_rc_v() const { return x_[0]; }
 
  private:
+  /// The mean overpotential of half an hour, from the samples whose time crosses a multiple of 2^26 us.
+  void watch(S overpotential_v, S duration_s) {
+    const std::uint32_t before_us = time_us_;
+    time_us_ += static_cast<std::uint32_t>(duration_s * S(1e6));
+    if (last_us_ == 0)
+      last_us_ = time_us_;
+    else if ((time_us_ ^ before_us) >> 26 != 0) {
+      lasting_v_ += (overpotential_v - lasting_v_) * (S(time_us_ - last_us_) * S(1e-6 / 1'800));
+      last_us_ = time_us_;
+    }
+  }
+
   Covariance covariance_;
   typename Model::State x_{};
-  S soc_;
+  S soc_, lasting_v_{};
+  std::uint32_t time_us_ = 0, last_us_ = 0;
   std::uint8_t interval_ = 0;
 };
 

@@ -17,7 +17,8 @@ TYPED_TEST_SUITE(StartOfEveryScalar, Scalars);
 template <class Cell, class V>
 auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
   using S = typename Cell::Scalar;
-  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, arithmetic::Variance<S>(sigma_v * sigma_v), nullptr});
+  const auto variance_v2 = arithmetic::Variance<S>(sigma_v * sigma_v);
+  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, variance_v2, variance_v2, nullptr});
 }
 
 template <class S>

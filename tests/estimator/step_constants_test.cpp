@@ -1,10 +1,12 @@
 #include "estimator/step_constants.hpp"
 
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
 #include "estimator/persistent_errors.hpp"
+#include "model/extended.hpp"
 #include "tests/cells.hpp"
 
 namespace bms::estimator {
@@ -65,6 +67,28 @@ TEST(StepConstants, TheColdBeginsBelowTheReferenceTemperatureOfTheCell) {
   c.set_temperature(cell, -500);
   const double more = std::exp(40'000 / 8.314462618 * (1 / 268.15 - 1 / 283.15)) - 1;
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + more, 1e-6);
+}
+
+TEST(StepConstants, ACellThatFollowsTheTemperatureIsUncertainOutsideOfItsIdentification) {
+  auto parameters = tests::table9;
+  parameters.tolerance.resistance_per_ev = 0.2;
+  parameters.range.temperature_min_c = 0;
+  parameters.range.temperature_max_c = 40;
+  using Cell = model::ExtendedCell<double, model::max_intervals, model::ChosenLaws<double>>;
+  const std::vector<model::MechanismSetting> follows{
+      model::default_setting(model::mechanism_index("temperature_resistance"), parameters)};
+  const Cell cell{tests::prepared<double>(parameters), model::chosen<double>(follows, parameters.capacity_ah)};
+  Constants<double> c;
+  c.set_time_step(cell.noise, 1'000'000);
+  constexpr double k_ev = 8.617333e-5;
+  for (const double celsius : {0.0, 25.0, 40.0}) {
+    c.set_temperature(cell, static_cast<std::int16_t>(100 * celsius));
+    EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error) << celsius;
+  }
+  c.set_temperature(cell, -2'000);
+  EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 253.15 - 1 / 273.15) / k_ev, 1e-5);
+  c.set_temperature(cell, 6'000);
+  EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 313.15 - 1 / 333.15) / k_ev, 1e-5);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 //   filter        instructions of the filter with each form of the covariance
 //   board         figures that depend on the code alone, not on recordings or the machine
 //   protection    instructions of the protection
+//   accuracy      state of charge of simulated cells: the shift and a thousand hours
 //   budgets       flash, RAM and stack of the boards
 //   trials        state of charge on real recordings
 //   fixed         fixed point against double, and the microbit against the host
@@ -396,12 +397,15 @@ void write_trials() {
   files::replace_figures(trials, "trials", soc_trials(data));
 }
 
+void write_accuracy() {
+  files::replace_figures(source / "estimator/README.md", "shift", shift_accuracy());
+  files::replace_figures(source / "estimator/README.md", "duty", thousand_hours());
+}
+
 void run() {
-  const auto estimator = source / "estimator/README.md";
   write_board();
   write_front_page();
-  files::replace_figures(estimator, "shift", shift_accuracy());
-  files::replace_figures(estimator, "duty", thousand_hours());
+  write_accuracy();
   if (std::filesystem::exists(data)) {
     write_trials();
     files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point());
@@ -425,6 +429,8 @@ int main(int argc, char** argv) {
       bms::files::replace_figures(bms::source / "estimator/README.md", "filter forms", bms::filter_forms());
     else if (argc > 1 && std::string_view(argv[1]) == "readme")
       bms::write_front_page();
+    else if (argc > 1 && std::string_view(argv[1]) == "accuracy")
+      bms::write_accuracy();
     else if (argc > 1 && std::string_view(argv[1]) == "board")
       bms::write_board();
     else if (argc > 1 && std::string_view(argv[1]) == "budgets")

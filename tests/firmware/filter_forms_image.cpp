@@ -9,7 +9,7 @@
 namespace bms::firmware {
 
 template <class Covariance>
-using Filter = tests::ReferenceFilter<float, Covariance>;
+using Filter = tests::ReferenceFilter<float, Covariance, false>;
 using UdFilter = Filter<estimator::UdCovariance<float, 2>>;
 using JosephFilter = Filter<tests::EigenCovariance<float, 2, tests::Form::joseph>>;
 using PlainFilter = Filter<tests::EigenCovariance<float, 2, tests::Form::plain>>;

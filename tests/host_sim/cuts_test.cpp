@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "files/bad_input.hpp"
@@ -45,6 +46,33 @@ TEST(Cuts, OfTheShiftRunFromEachCutToTheEndWithEachStart) {
   EXPECT_LT(result.starts[0].worst_rmse[0], 0.03) << "started right";
   EXPECT_EQ(result.starts[0].inside[2], 1);
   EXPECT_GT(result.starts[3].runs[1].rmse[0], 0) << "started 20 % wrong";
+}
+
+TEST(Cuts, AreCountedIfTheyAreOutsideOfTwoSigmaForTooLong) {
+  const auto recording = files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  const CutResult result = run_cuts(files::read_cell("table9"), recording, 3);
+  for (const CutFigures& f : result.starts) {
+    for (std::size_t i = 0; i < cut_inside_limits.size(); ++i) {
+      const auto below = std::count_if(f.runs.begin(), f.runs.end(),
+                                       [&](const CutRun& run) { return run.inside[1] < cut_inside_limits[i]; });
+      EXPECT_EQ(f.cuts_below[i], static_cast<std::size_t>(below)) << f.start.title;
+    }
+  }
+  EXPECT_THAT(cut_rows(result), HasSubstr(" | 0, 0 of 3 | ")) << "started right";
+}
+
+TEST(Cuts, OfTwoRecordingsCountOnceEachInTheSummary) {
+  CutResult one;
+  CutFigures f;
+  f.runs.resize(2);
+  f.runs[0].inside = {0.5, 0.6, 0.7};
+  f.runs[1].inside = {0.8, 1, 1};
+  f.runs[0].median_ratio = 2;
+  f.runs[1].median_ratio = 0.5;
+  one.starts.assign(cut_starts.size(), f);
+  CutResult other = one;
+  for (CutFigures& starts : other.starts) starts.runs.resize(1);
+  EXPECT_THAT(cut_summary({one, other}), HasSubstr("| unknown | 3 | 0.00, 0.00, 0.00 | 60, 73, 80 | 2, 2 | 2.00 |"));
 }
 
 TEST(Cuts, NeedAReference) {

@@ -1,0 +1,95 @@
+// Monitor of the filter's consistency: the mean deviation of the voltage from the model over half an hour, as long as a
+// model's error lasts.
+//
+//   d' = d + share (innovation + estimated voltage error - d)         share = time since the last check / 1800 s
+//
+// A filter that is right has d within its own standard deviation: model error, error of the overpotential, slope of the
+// OCV times the sigma of the SOC. d beyond 3 of them is inconsistent: one false alarm in 370 half hours if the errors
+// are normal. SocEstimator then opens the bank of hypotheses, with d^2 as a part of the model's error, because it may
+// be the model that is wrong. The largest sigma of the last half hour counts, since d lags behind.
+//
+// The overpotential counts in the same way: its mean over half an hour is a part of the voltage noise, because the
+// error of a polarisation outlasts the load.
+//
+// A sample is checked when its time crosses a multiple of 2^26 us, about a minute: an ordinary step costs one
+// comparison of the innovation with a limit, which it needs for outliers anyway. A load that repeats in whole minutes
+// is seen at all its phases.
+#pragma once
+
+#include <cstdint>
+
+#include "arithmetic/scalar.hpp"
+#include "estimator/outlier_gate.hpp"
+
+namespace bms::estimator {
+
+template <class S>
+class Consistency {
+  using Voltage = arithmetic::Voltage<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+
+ public:
+  static constexpr double mean_over_s = 1'800;
+  static constexpr double max_sigmas = 3;
+  /// Smallest standard deviation of any model's voltage over half an hour [V], whatever its cell file says.
+  static constexpr double min_error_v = 0.005;
+  static constexpr int turn_bits = 26;  ///< microseconds of a turn, as a power of two
+
+  /// Whether a turn ends between two samples.
+  static constexpr bool turn_ends(std::uint64_t before_us, std::uint64_t now_us) {
+    return (static_cast<std::uint32_t>(before_us) ^ static_cast<std::uint32_t>(now_us)) >> turn_bits != 0;
+  }
+  /// The next sample is checked. Not inline: a conditional store would be counted in every step.
+  [[gnu::noinline]] constexpr void ask() { unchecked_below_v_ = Voltage(-1); }
+  /// Whether a sample is to be checked: one that was asked for, the first one, and a suspect innovation, which may not
+  /// be a number.
+  constexpr bool is_due(const Voltage& innovation_v) const {
+    return !(arithmetic::magnitude(innovation_v) <= unchecked_below_v_);
+  }
+  /// A sample is checked. every: so is the next one. Returns the time since the last one that was asked for, and 0 for
+  /// a suspect one in between.
+  constexpr std::uint64_t begin(std::uint64_t now_us, bool every) {
+    if (unchecked_below_v_ > Voltage(0)) return 0;
+    if (!every) unchecked_below_v_ = OutlierGate<S>::suspect_v();
+    const std::uint64_t since_us = last_us_ != 0 ? now_us - last_us_ : 0;
+    last_us_ = now_us;
+    return since_us;
+  }
+  /// Weight of a check in the means.
+  static constexpr Fraction share_of(const arithmetic::TimeStep<S>& seconds) {
+    return seconds < arithmetic::TimeStep<S>(mean_over_s) ? Fraction(seconds * Fraction(1 / mean_over_s)) : Fraction(1);
+  }
+
+  /// deviation_v: of a reading from the model; overpotential_v: of the model; share: of this check in the means.
+  constexpr void add(const Voltage& deviation_v, const Voltage& overpotential_v, const Fraction& share) {
+    mean_v_ = Voltage(mean_v_ + share * Voltage(deviation_v - mean_v_));
+    overpotential_v_ = Voltage(overpotential_v_ + share * Voltage(overpotential_v - overpotential_v_));
+  }
+  constexpr Variance variance() const { return mean_v_ * mean_v_; }
+  /// Square of the mean overpotential.
+  constexpr Variance overpotential_v2() const { return overpotential_v_ * overpotential_v_; }
+
+  /// Returns true if the mean is so large, or not a number, that is_inconsistent() has to decide. Costs one comparison.
+  constexpr bool is_suspect() const { return !(arithmetic::magnitude(mean_v_) <= Voltage(max_sigmas * min_error_v)); }
+  /// expected_v2: variance that the filter expects of a deviation that lasts.
+  constexpr bool is_inconsistent(const Variance& expected_v2, const Fraction& share) {
+    expected_v2_ = Variance(expected_v2_ - arithmetic::product<Variance>(expected_v2_, share));
+    if (expected_v2_ < expected_v2) expected_v2_ = expected_v2;
+    return !(variance() <= arithmetic::product<Variance>(expected_v2_, arithmetic::Count<S>(max_sigmas * max_sigmas)));
+  }
+  /// The deviation so far is explained; the next sample is checked.
+  constexpr void reset() {
+    ask();
+    mean_v_ = Voltage(0);
+    expected_v2_ = Variance{};
+  }
+
+ private:
+  Voltage unchecked_below_v_{-1};
+  std::uint64_t last_us_ = 0;  ///< time of the last check that was asked for
+  Voltage mean_v_{}, overpotential_v_{};
+  Variance expected_v2_{};
+};
+
+}  // namespace bms::estimator

@@ -1,0 +1,158 @@
+// Finds out when the voltages contradict the state of charge: single voltages that are outliers (outlier_gate.hpp), a
+// mean over half an hour that is inconsistent (consistency.hpp), or a bank of hypotheses that prefers another SOC
+// (ambiguous_soc.hpp). Then the bank estimates the SOC again, with a wider sigma.
+//
+// An ordinary step only compares its innovation with a limit (is_due).
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "estimator/ambiguous_soc.hpp"
+#include "estimator/cell_state.hpp"
+#include "estimator/consistency.hpp"
+#include "estimator/estimate.hpp"
+#include "estimator/outlier_gate.hpp"
+#include "estimator/persistent_errors.hpp"
+#include "estimator/start.hpp"
+#include "estimator/voltage_uncertainty.hpp"
+#include "model/extended_rc.hpp"
+
+namespace bms::estimator {
+
+template <class S, template <class> class ModelOf>
+class SocMonitor {
+  using Model = ModelOf<S>;
+  using Errors = PersistentErrors<S, ModelOf>;
+  using State = CellState<S, ModelOf>;
+  using StepInput = model::StepInput<S>;
+  using Soc = arithmetic::Soc<S>;
+  using Voltage = arithmetic::Voltage<S>;
+  using Variance = arithmetic::Variance<S>;
+  using Fraction = arithmetic::Fraction<S>;
+  using Count = arithmetic::Count<S>;
+
+ public:
+  /// Variance of the model's error in the bank after a contradiction, in addition to the expected one: the model may be
+  /// three times as wrong as its file says.
+  static constexpr double model_may_be_off = 8;
+  /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
+  static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
+
+  template <class Cell>
+  constexpr void start(const Cell& cell) {
+    reading_noise_v2_ = cell.noise.voltage_v2;
+  }
+  constexpr AmbiguousSoc<S, ModelOf>& bank() { return bank_; }
+  constexpr bool bank_is_open() const { return bank_.open(); }
+
+  /// The next sample is checked.
+  constexpr void ask() { consistency_.ask(); }
+  constexpr bool is_due(const Voltage& innovation_v) const { return consistency_.is_due(innovation_v); }
+  /// Variance of a reading: its own noise, and the error of the overpotential of the last half hour.
+  constexpr const Variance& reading_noise_v2() const { return reading_noise_v2_; }
+
+  /// Updates the means over half an hour. above_ocv_v: predicted voltage above the OCV; measured: the current was.
+  template <class Cell, class Constants>
+  constexpr void watch(const Cell& cell, const Constants& constants, const State& state, std::uint64_t time_us,
+                       const Voltage& above_ocv_v, const Voltage& innovation_v, bool measured) {
+    const std::uint64_t since_us = consistency_.begin(time_us, bank_.open());
+    if (since_us == 0) return;
+    share_ = Consistency<S>::share_of(arithmetic::seconds<S>(Constants::capped(since_us)));
+    if (measured)
+      consistency_.add(Errors::with_error(state, innovation_v), Errors::without_error(state, above_ocv_v), share_);
+    reading_noise_v2_ = Variance(cell.noise.voltage_v2 + arithmetic::product<Variance>(consistency_.overpotential_v2(),
+                                                                                       constants.resistance_noise()));
+  }
+
+  constexpr bool has_to_judge(const Voltage& innovation_v) const {
+    return bank_.open() || consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v);
+  }
+  /// Square of the overpotential as its error counts.
+  constexpr Variance overpotential_v2(const Voltage& above_ocv_v, const State& state) const {
+    const Voltage present_v = Errors::without_error(state, above_ocv_v);
+    return Variance(present_v * present_v + consistency_.overpotential_v2());
+  }
+
+  /// Returns 0 if the filter may use the voltage; else the flags of a voltage that it may not use. interval: of soc.
+  template <class Cell, class Constants>
+  constexpr std::uint32_t judge(const Cell& cell, const StepInput& input, const Constants& constants, const Soc& soc,
+                                const Voltage& innovation_v, const Variance& overpotential_v2, std::uint8_t interval,
+                                State& state) {
+    const Variance of_resistances_v2 = arithmetic::product<Variance>(
+        arithmetic::product<Variance>(overpotential_v2, constants.resistance_error()), constants.resistance_error());
+    if (bank_.open() &&
+        correct_from_bank(cell, input, constants, soc, innovation_v, of_resistances_v2, interval, state))
+      return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};
+    if (!consistency_.is_suspect() && !OutlierGate<S>::is_suspect(innovation_v)) return 0;
+    return judge_deviation(cell, input, soc, innovation_v, of_resistances_v2, interval, state);
+  }
+
+  /// The filter corrected its SOC by `by` while the bank is open in the background.
+  constexpr void follow(const Soc& by) { bank_.follow(by); }
+
+ private:
+  /// Flags of an outlier, or of a voltage that shows that the state is inconsistent; else 0.
+  template <class Cell>
+  constexpr std::uint32_t judge_deviation(const Cell& cell, const StepInput& input, const Soc& soc,
+                                          const Voltage& innovation_v, const Variance& of_resistances_v2,
+                                          std::uint8_t interval, State& state) {
+    const model::OperatingPoint tables{cell, input, Model::mechanism_states(state.model_state)};
+    const auto at = look_up(tables, soc, interval);
+    const auto h = Model::measurement_jacobian(laws_of(cell), at, input);
+    const Variance variance = state.soc_variance();
+    const Variance of_soc_v2 =
+        arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
+    const Variance of_model_v2 =
+        Variance(Variance(soc_axis_variance<S>(tables, cell.noise, at, soc, innovation_v) +
+                          Errors::model_error_beyond_states(cell.noise)) +
+                 Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state, h) + of_resistances_v2));
+    const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
+    const bool judged_by_bank = bank_.open() && !bank_.in_background();
+    if (consistency_.is_inconsistent(expected_v2, share_) && !judged_by_bank) {
+      estimate_again(cell, soc, variance, of_model_v2, state);
+      return soc_ambiguous | soc_contradicted;
+    }
+    return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
+  }
+
+  /// Opens the bank around the present SOC, with a wider sigma.
+  template <class Cell>
+  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance, const Variance& of_model_v2,
+                                State& state) {
+    const Variance wider = arithmetic::product<Variance>(variance, Count(wider_sigma * wider_sigma));
+    const auto least = Variance(least_sigma * least_sigma);
+    const SocDistribution<S> before{soc, wider < least ? least : wider};
+    contradicted_ = true;
+    state.covariance.template reset<Model::soc>(before.variance);
+    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_may_be_off)),
+                   seen_v2 = consistency_.variance();
+    bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &before}, false,
+                  seen_v2 < more_v2 ? seen_v2 : more_v2);
+    consistency_.reset();
+  }
+
+  /// Returns true if the bank has the SOC; false while it only watches.
+  template <class Cell, class Constants>
+  constexpr bool correct_from_bank(const Cell& cell, const StepInput& input, const Constants& constants, const Soc& soc,
+                                   const Voltage& innovation_v, const Variance& of_resistances_v2,
+                                   std::uint8_t interval, State& state) {
+    const bool watched = bank_.in_background();
+    bank_.update(cell, input, constants, soc, Errors::with_error(state, innovation_v), of_resistances_v2, interval,
+                 state);
+    if (watched && !bank_.in_background()) {
+      contradicted_ = true;
+      consistency_.reset();
+    }
+    if (!bank_.open() || bank_.in_background()) contradicted_ = false;
+    return !watched || !bank_.in_background();
+  }
+
+  Consistency<S> consistency_;
+  Variance reading_noise_v2_{};
+  Fraction share_{};  ///< of the last check in the means
+  AmbiguousSoc<S, ModelOf> bank_;
+  bool contradicted_ = false;
+};
+
+}  // namespace bms::estimator

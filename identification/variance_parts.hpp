@@ -1,0 +1,18 @@
+// Separates errors into a constant part and a part that grows with a known quantity.
+#pragma once
+
+#include <span>
+
+namespace bms::identification {
+
+/// RMS error = sqrt(constant^2 + (per * by)^2).
+struct VarianceParts {
+  double constant = 0, per = 0;  ///< >= 0
+};
+
+/// Maximum likelihood of both parts, for normal errors: each entry of rms is the error of one set, and that of by the
+/// size of what its second part is proportional to. Every set counts once, and relative to its expected size: the
+/// largest errors do not decide alone. With fewer than two sets, or if by does not differ, all is constant.
+VarianceParts variance_parts(std::span<const double> rms, std::span<const double> by);
+
+}  // namespace bms::identification

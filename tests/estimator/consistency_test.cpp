@@ -1,0 +1,111 @@
+#include "estimator/consistency.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace bms::estimator {
+namespace {
+
+constexpr double share = 1.0 / 1'800;  // one second
+
+TEST(Consistency, ADeviationThatLastsIsFoundAsAMeanOverHalfAnHourWouldFindIt) {
+  Consistency<double> monitor;
+  const double expected_v2 = 0.010 * 0.010;
+  int seconds = 0;
+  while (!monitor.is_inconsistent(expected_v2, share)) {
+    monitor.add(0.05, 0, share);
+    ++seconds;
+  }
+  EXPECT_NEAR(seconds, -1'800 * std::log(1 - 0.6), 5) << "an exponential mean of 50 mV reaches 30 mV";
+}
+
+TEST(Consistency, ADeviationInsideItsSigmaIsNeverInconsistent) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 100'000; ++k) {
+    monitor.add(0.02, 0, share);
+    EXPECT_FALSE(monitor.is_inconsistent(0.010 * 0.010, share));
+  }
+}
+
+TEST(Consistency, OneWrongReadingIsNotEvenSuspect) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 10; ++k) monitor.add(2, 0, share);
+  EXPECT_FALSE(monitor.is_suspect());
+}
+
+TEST(Consistency, ALoadThatHasEndedStillExplainsADeviation) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 1'800; ++k) {
+    monitor.add(0.2, 0, share);
+    EXPECT_FALSE(monitor.is_inconsistent(0.1 * 0.1, share)) << "under load 100 mV are expected";
+  }
+  EXPECT_FALSE(monitor.is_inconsistent(1e-4, share)) << "the first second of the rest";
+}
+
+TEST(Consistency, AnOverpotentialCountsForHalfAnHourAfterItsLoad) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 7'200; ++k) monitor.add(0, 0.1, share);
+  EXPECT_NEAR(monitor.overpotential_v2(), 0.01, 4e-4);
+  for (int k = 0; k < 1'800; ++k) monitor.add(0, 0, share);
+  EXPECT_NEAR(std::sqrt(monitor.overpotential_v2()), 0.1 / std::exp(1.0), 2e-3);
+}
+
+TEST(Consistency, ALoadInBothDirectionsLeavesNoOverpotential) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 7'200; ++k) monitor.add(0, k % 2 == 0 ? 0.1 : -0.1, share);
+  EXPECT_LT(monitor.overpotential_v2(), 1e-6);
+}
+
+/// Seconds, from 1, whose samples are checked, and the time since the check before.
+std::vector<std::pair<int, std::uint64_t>> checks(Consistency<double>& monitor, int seconds, bool every) {
+  std::vector<std::pair<int, std::uint64_t>> which;
+  for (int k = 1; k <= seconds; ++k) {
+    const auto now_us = static_cast<std::uint64_t>(k) * 1'000'000;
+    if (Consistency<double>::turn_ends(now_us - 1'000'000, now_us)) monitor.ask();
+    if (monitor.is_due(0.001)) which.emplace_back(k, monitor.begin(now_us, every));
+  }
+  return which;
+}
+
+TEST(Consistency, TheFirstSampleAndThenOneInAMinuteIsChecked) {
+  Consistency<double> monitor;
+  const std::vector<std::pair<int, std::uint64_t>> expected = {
+      {1, 0}, {68, 67'000'000}, {135, 67'000'000}, {202, 67'000'000}};  // multiples of 67.1 s
+  EXPECT_EQ(checks(monitor, 220, false), expected);
+}
+
+TEST(Consistency, EverySampleIsCheckedWhileThatIsAskedFor) {
+  Consistency<double> monitor;
+  EXPECT_EQ(checks(monitor, 40, true).size(), 40U);
+}
+
+TEST(Consistency, ASuspectVoltageInBetweenDoesNotMoveTheTurn) {
+  Consistency<double> monitor;
+  EXPECT_TRUE(monitor.is_due(0.001));
+  EXPECT_EQ(monitor.begin(1'000'000, false), 0U);
+  EXPECT_FALSE(monitor.is_due(0.001));
+  EXPECT_TRUE(monitor.is_due(0.5));
+  EXPECT_EQ(monitor.begin(2'000'000, false), 0U);
+  monitor.ask();
+  EXPECT_EQ(monitor.begin(34'000'000, false), 33'000'000U);
+}
+
+TEST(Consistency, NotANumberIsChecked) {
+  Consistency<double> monitor;
+  monitor.begin(1'000'000, false);
+  EXPECT_TRUE(monitor.is_due(std::nan("")));
+}
+
+TEST(Consistency, TheSampleAfterAContradictionIsChecked) {
+  Consistency<double> monitor;
+  monitor.begin(1'000'000, false);
+  monitor.reset();
+  EXPECT_TRUE(monitor.is_due(0));
+}
+
+}  // namespace
+}  // namespace bms::estimator

@@ -1,0 +1,106 @@
+// The estimator started at 30 places of each real recording: right, wrong and unknown (host_sim/cuts.hpp).
+//
+//   soc_cuts                    prints the tables of all recordings
+//   soc_cuts NAME...            of the recordings whose file name contains a NAME; "shift" is the shipped one
+//   soc_cuts --cell FILE NAME   with another cell file
+//   soc_cuts --write            writes the tables of all recordings into docs/figures/soc_trials.md
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/recording.hpp"
+#include "host_sim/cuts.hpp"
+
+namespace bms {
+namespace {
+
+constexpr std::size_t cuts = 30;
+const std::filesystem::path source = BMS_SOURCE_DIR, data = BMS_DATA_DIR;
+
+struct Case {
+  std::filesystem::path recording;
+  std::string cell;
+};
+
+/// From cold to hot; then those of 25 degrees C that no cell file was identified from.
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const char* name : {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002",
+                           "dyn10_P45_A002", "udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})
+    all.push_back({data / "a123_26650" / (std::string(name) + ".csv"), "a123_26650_extended"});
+  for (const char* name : {"dyn30_N05", "dyn45_P05", "dyn50_P25"})
+    all.push_back({data / "a123_esctoolbox" / (std::string(name) + ".csv"), "a123_esctoolbox_extended"});
+  all.push_back({source / "recordings/forklift_shift.csv", "table9"});
+  return all;
+}
+
+bool chosen(const Case& c, const std::vector<std::string>& names) {
+  if (names.empty()) return true;
+  for (const std::string& name : names) {
+    if (c.recording.filename().string().find(name) != std::string::npos) return true;
+  }
+  return false;
+}
+
+struct Options {
+  bool write = false;
+  std::string cell;
+  std::vector<std::string> names;
+};
+
+int run(const Options& options) {
+  std::vector<host_sim::CutResult> results;
+  std::string table = host_sim::cut_heading();
+  if (!options.write) fmt::print("{}", table);
+  for (const Case& c : cases()) {
+    if (!std::filesystem::exists(c.recording) || !chosen(c, options.names)) continue;
+    const std::string cell = options.cell.empty() ? c.cell : options.cell;
+    results.push_back(host_sim::run_cuts(files::read_cell(cell), files::read_recording(c.recording.string()), cuts));
+    const std::string rows = host_sim::cut_rows(results.back());
+    table += rows;
+    if (!options.write) fmt::print("{}", rows);
+    std::fflush(stdout);
+  }
+  if (results.empty()) {
+    fmt::print(stderr, "soc_cuts: no recording, expected {} or another name\n", data.string());
+    return 2;
+  }
+  const std::string summary = host_sim::cut_summary(results);
+  if (options.write) {
+    const auto page = source / "docs/figures/soc_trials.md";
+    files::replace_figures(page, "cuts", table);
+    files::replace_figures(page, "all cuts", summary);
+  } else {
+    fmt::print("\n{}", summary);
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace bms
+
+int main(int argc, char** argv) {
+  bms::Options options;
+  for (int k = 1; k < argc; ++k) {
+    const std::string_view word = argv[k];
+    if (word == "--write")
+      options.write = true;
+    else if (word == "--cell" && k + 1 < argc)
+      options.cell = argv[++k];
+    else
+      options.names.emplace_back(word);
+  }
+  try {
+    return bms::run(options);
+  } catch (const std::exception& e) {
+    fmt::print(stderr, "soc_cuts: {}\n", e.what());
+    return 2;
+  }
+}
