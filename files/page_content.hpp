@@ -26,6 +26,8 @@ struct PageChart {
   std::vector<std::string> labels;  ///< one for each column
   std::vector<double> time_s;
   std::vector<std::vector<double>> columns;  ///< NaN: no value
+  std::vector<std::string> right = {};       ///< labels that belong to an axis of their own, on the right
+  std::string x_label = "time, s";           ///< of time_s, which need not be a time
 };
 
 struct PageContent {

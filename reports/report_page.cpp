@@ -242,13 +242,20 @@ std::string policy_in(std::string_view page) {
 
 namespace {
 
+/// Of the value from the paper's number: points of percent, or a part of it.
+std::string difference_of(const files::PageCell& c) {
+  if (!c.value || !std::isfinite(*c.value)) return "";
+  if (c.text.find('%') != std::string::npos) return fmt::format(" ({:+.1f} points)", *c.value - *c.paper);
+  return *c.paper != 0 ? fmt::format(" ({:+.0f} %)", 100 * (*c.value / *c.paper - 1)) : "";
+}
+
 json table_of(const files::PageTable& t) {
   json rows = json::array();
   for (const auto& row : t.rows) {
     json cells = json::array();
     for (const files::PageCell& c : row) {
       json cell = {{"text", c.text}};
-      if (c.paper) cell["paper"] = fmt::format("{:g}", *c.paper);
+      if (c.paper) cell["paper"] = fmt::format("{:g}{}", *c.paper, difference_of(c));
       cells.push_back(std::move(cell));
     }
     rows.push_back(std::move(cells));
@@ -265,7 +272,8 @@ json chart_of(const files::PageChart& c) {
       row.push_back(k < column.size() ? json(std::round(column[k] * 1e5) / 1e5) : json(nullptr));
     rows.push_back(std::move(row));
   }
-  return {{"title", c.title}, {"chart", {{"labels", c.labels}, {"rows", std::move(rows)}}}};
+  return {{"title", c.title},
+          {"chart", {{"labels", c.labels}, {"rows", std::move(rows)}, {"right", c.right}, {"x", c.x_label}}}};
 }
 
 }  // namespace

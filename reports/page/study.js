@@ -1,5 +1,6 @@
 // Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text,
-// paper}]]}} | {title, chart: {labels, rows}}]}.
+// paper}]]}} | {title, chart: {labels, rows, right, x}}]}. right: labels on an axis of their own; x: label of the first
+// value of each row.
 (() => {
   'use strict';
   const {make} = drawing;
@@ -20,22 +21,28 @@
       for (const row of section.table.rows) {
         const tr = table.insertRow();
         for (const cell of row) {
-          const td = make(tr, 'td', cell.text);
+          const td = make(tr, 'td', cell.text, /[a-z]{4}/.test(cell.text) ? 'words' : undefined);
           if (cell.paper !== undefined) make(td, 'span', ' paper ' + cell.paper, 'paper');
         }
       }
     } else {
+      const right = section.chart.right || [];
+      const series = Object.fromEntries(right.map(label => [label, {axis: 'y2'}]));
       const legend = make(caption, 'span', '', 'legend');
       const div = make(box, 'div', undefined, 'chart tall');
       window.charts.push(new Dygraph(div, section.chart.rows, {
-        labels: ['time, s', ...section.chart.labels],
+        labels: [section.chart.x || 'time, s', ...section.chart.labels],
+        series: series,
         labelsDiv: legend,
         legend: 'always',
         colors: colors,
         axisLabelFontSize: 12,
         gridLineColor: '#e3e8ee',
         strokeWidth: 1.2,
-        axes: {y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
+        axes: {
+          y: {axisLabelWidth: 58, pixelsPerLabel: 24},
+          y2: {axisLabelWidth: 58, pixelsPerLabel: 24, independentTicks: true, drawGrid: false},
+        },
       }));
     }
     if (section.note) make(box, 'p', section.note, 'note');
