@@ -14,7 +14,7 @@ namespace bms::study {
 
 namespace {
 
-constexpr int screening_points = 10, iterations = 8, refit_iterations = 2;
+constexpr int screening_points = 10, iterations = 8, refit_iterations = 5;
 constexpr double z = 1.959964;  // 95 %
 using Clock = std::chrono::steady_clock;
 
@@ -138,11 +138,12 @@ HeldOut held_out(const PaperFit& fit, const Eigen::VectorXd& from, const Split& 
   return out;
 }
 
-std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Fitted& of) {
-  const PaperFit fit(cell, of.effects);
+/// Each refit begins at the start values, not at the optimum of all figures, which would know what is left out.
+std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Effects& effects) {
+  const PaperFit fit(cell, effects);
   const std::vector<Split> splits = splits_of(fit.published());
   std::vector<HeldOut> out(splits.size());
-  in_parallel(splits.size(), [&](std::size_t k) { out[k] = held_out(fit, of.x, splits[k]); });
+  in_parallel(splits.size(), [&](std::size_t k) { out[k] = held_out(fit, fit.start(), splits[k]); });
   return out;
 }
 
@@ -229,8 +230,8 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell) {
     d.physics.push_back({u.id, std::exp(best.x[at]), std::max(u.low, std::exp(best.x[at] - z * deviation[at])),
                          std::min(u.high, std::exp(best.x[at] + z * deviation[at])), u.unit});
   }
-  d.held_out = all_held_out(cell, best);
-  d.held_out_plain = all_held_out(cell, *plain);
+  d.held_out = all_held_out(cell, best.effects);
+  d.held_out_plain = all_held_out(cell, plain->effects);
   d.simulated = best.simulated;
   d.contradictions = contradictions_of(best.simulated, fit.published());
   d.statement = statement_of(d);
