@@ -42,6 +42,7 @@ struct GreyBoxOptions {
   double voltage_sigma_v = 0.001;    ///< weight of a voltage residual against a prior
   /// Residual of two neighbouring nodes that differ as much as those of Table 9 do; 0: nodes are independent.
   double tie_v = 0;
+  bool one_start = false;  ///< only the start given, without other time constants
 };
 
 enum class Quantity { r0, r1, c1, ocv_branch, initial_v_rc, initial_soc };

@@ -108,6 +108,7 @@ void search(const GreyBox& grey_box, const LeastSquares& problem, Method method,
     costs.push_back(found.cost);
     evaluations += found.evaluations;
     if (costs.size() == 1 || found.cost < result.optimum.cost) result.optimum = std::move(found);
+    if (grey_box.options().one_start) break;
   }
   result.optimum.evaluations = evaluations;
   result.starts = static_cast<int>(costs.size());
@@ -199,7 +200,8 @@ void set_estimation(const GreyBox& grey_box, const Uncertainty& u, Identificatio
     }
   }
   result.estimation.fit_percent = open_loop.percent();
-  result.estimation.one_step_fit_percent = one_step.percent();
+  result.estimation.one_step_fit_percent = open_loop.percent();
+  result.estimation.corrected_one_step_fit_percent = one_step.percent();
   result.estimation.rmse_v = error.rms();
   result.estimation.largest_v = error.max();
   result.estimation.samples = error.count();
@@ -238,7 +240,8 @@ FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& 
     if (k > 0 && std::isfinite(fit.error_v[k - 1])) one_step.add(v, simulated_v[k] + fading * fit.error_v[k - 1]);
   }
   fit.fit_percent = open_loop.percent();
-  fit.one_step_fit_percent = one_step.percent();
+  fit.one_step_fit_percent = open_loop.percent();
+  fit.corrected_one_step_fit_percent = one_step.percent();
   fit.rmse_v = error.rms();
   fit.largest_v = error.max();
   fit.samples = error.count();

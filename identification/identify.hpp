@@ -31,7 +31,12 @@ struct FitStatistics {
   double fit_percent = 0;  ///< Eq. A6, open loop
   double rmse_v = 0;       ///< open loop; in contrast to the fit it can be compared between recordings
   double largest_v = 0;
-  double one_step_fit_percent = 0;  ///< of the one-step prediction (residuals.hpp)
+  /// Of the one-step predictor of the structure. TF, OE, Hammerstein-Wiener and grey box have white noise on the output
+  /// only, so earlier errors say nothing about the next sample: their one-step prediction is the simulation.
+  double one_step_fit_percent = 0;
+  /// The same with the last error added, decayed by `fading` (residuals.hpp): a first-order disturbance, which none of
+  /// these structures contains.
+  double corrected_one_step_fit_percent = 0;
   struct PredictionError {
     int steps = 0;
     double rmse_v = 0;
@@ -50,7 +55,8 @@ struct InitialState {
 
 struct Identification {
   std::vector<Parameter> parameters;
-  Eigen::MatrixXd correlation;  ///< of the parameters and then the initial states, in the order of the optimum
+  std::vector<Parameter> polynomials;  ///< of a linear model: c0 c1 c2 a1 a2 (Eq. 11), or b_1 b_2 b_3 f_1 f_2 (Eq. 19)
+  Eigen::MatrixXd correlation;         ///< of the parameters and then the initial states, in the order of the optimum
   FitStatistics estimation;
   double correlation_length = 1;      ///< samples over which residuals are correlated
   double fading = 0;                  ///< lag-one autocorrelation of the residuals, for predictions on other data

@@ -1,6 +1,5 @@
 #include "identification/linear_models.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 
@@ -9,93 +8,44 @@
 
 #include "identification/circuit_from_discrete.hpp"
 #include "identification/prefilter.hpp"
+#include "identification/resample.hpp"
 
 namespace bms::identification {
 
 namespace {
 
-constexpr Eigen::Index pieces = 10;  // as many as the OCV of the paper has
-
-/// Position of w on the curve.
-struct Place {
-  Eigen::Index below = 0;
-  double weight_above = 0;
-};
-
-Place place(const StaticCurve& curve, double w_v) {
-  const double at = (w_v - curve.w_from_v) / curve.w_step_v;
-  const auto last = static_cast<double>(curve.y_v.size() - 2);
-  const double below = std::clamp(std::floor(at), 0.0, last);
-  return {static_cast<Eigen::Index>(below), at - below};
+Intersample input_of(LinearKind kind) {
+  return kind == LinearKind::transfer_function ? Intersample::zero_order_hold : Intersample::first_order_hold;
 }
 
-double through(const StaticCurve& curve, double w_v) {
-  if (curve.y_v.empty()) return w_v;
-  const Place p = place(curve, w_v);
-  const auto k = static_cast<std::size_t>(p.below);
-  return curve.y_v[k] + p.weight_above * (curve.y_v[k + 1] - curve.y_v[k]);
+/// The first measured voltage.
+double first_voltage(const Data& data) {
+  for (const double v : data.voltage_v) {
+    if (std::isfinite(v)) return v;
+  }
+  throw std::invalid_argument("fewer measured voltages than unknowns of the discrete model");
 }
 
-/// The problem of the linear block with the inner values of the curve as further unknowns. The ends of the curve are
-/// fixed, because gain and offset are already unknowns of the linear block.
-LeastSquares with_curve(const Data& data, const Structure& structure, const StaticCurve& start,
-                        const Eigen::VectorXd& linear_start) {
-  const LeastSquares linear = simulation_error(data, structure, linear_start);
-  const Eigen::Index n = linear_start.size(), inner = pieces - 1;
-  LeastSquares p;
-  p.scale.resize(n + inner);
-  p.scale << linear.scale, Eigen::VectorXd::Constant(inner, 0.01);
-  p.evaluate = [=](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    Eigen::MatrixXd of_linear;
-    if (!linear.evaluate(x.head(n), r, jacobian != nullptr ? &of_linear : nullptr)) return false;
-    StaticCurve curve = start;
-    for (Eigen::Index k = 0; k < inner; ++k) curve.y_v[static_cast<std::size_t>(k + 1)] = x[n + k];
-    if (jacobian != nullptr) jacobian->setZero(r.size(), n + inner);
-    for (Eigen::Index k = 0; k < r.size(); ++k) {
-      const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
-      if (!std::isfinite(measured_v)) continue;
-      const double w_v = r[k] + measured_v;
-      const Place at = place(curve, w_v);
-      r[k] = through(curve, w_v) - measured_v;
-      if (jacobian == nullptr) continue;
-      const auto below = static_cast<std::size_t>(at.below);
-      jacobian->row(k).head(n) = of_linear.row(k) * ((curve.y_v[below + 1] - curve.y_v[below]) / curve.w_step_v);
-      if (at.below > 0) (*jacobian)(k, n + at.below - 1) += 1 - at.weight_above;
-      if (at.below < inner) (*jacobian)(k, n + at.below) += at.weight_above;
-    }
-    return true;
-  };
-  return p;
+/// The model of a circuit at rest at the first measured voltage.
+DiscreteModel model_of(const CircuitParameters& circuit, LinearKind kind, const Structure& s, const Data& data) {
+  const DiscreteCoefficients c =
+      discrete_from_circuit(circuit, even_step_s(data.time_s), 3'600 * data.capacity_ah, input_of(kind));
+  DiscreteModel m;
+  m.nk = s.nk;
+  m.b = {c.c0, c.c1, c.c2};
+  m.f = {c.a1, c.a2};
+  const double first_v = first_voltage(data);
+  m.offset_v = s.estimate_offset ? first_v : s.offset_v;
+  if (s.estimate_initial) m.initial_v.assign(s.nf, s.estimate_offset ? 0 : first_v - s.offset_v);
+  return m;
 }
 
-Eigen::VectorXd simulated(const LinearModel& m, const Data& data) {
-  Eigen::VectorXd v = simulate(m.model, data.current_a);
-  for (Eigen::Index k = 0; k < v.size(); ++k) v[k] = through(m.curve, v[k]);
-  return v;
-}
-
-/// A curve y = w over the range of w, and its problem.
-LeastSquares begin_curve(const Data& data, Eigen::VectorXd& start, const Stopping& stopping, LinearModel& m) {
-  const Eigen::Index linear = start.size();
-  const LeastSquares problem = simulation_error(data, m.structure, start);
-  start = minimise(problem, start, Method::trust_region_reflective, stopping).x;
-  const Eigen::VectorXd w = simulate(to_model(start, m.structure), data.current_a);
-  m.curve.w_from_v = w.minCoeff();
-  m.curve.w_step_v = std::max(1e-6, (w.maxCoeff() - w.minCoeff()) / static_cast<double>(pieces));
-  for (Eigen::Index k = 0; k <= pieces; ++k)
-    m.curve.y_v.push_back(m.curve.w_from_v + static_cast<double>(k) * m.curve.w_step_v);
-  LeastSquares with = with_curve(data, m.structure, m.curve, start);
-  start.conservativeResize(linear + pieces - 1);
-  for (Eigen::Index k = 1; k < pieces; ++k) start[linear + k - 1] = m.curve.y_v[static_cast<std::size_t>(k)];
-  return with;
-}
-
-/// The circuit parameters of the model and their standard deviations, with warnings.
+/// The circuit parameters of the model and its polynomials, with their standard deviations and warnings.
 void set_circuit(const LinearModel& m, const Data& data, double soc, const Uncertainty& u, Identification& found) {
   const double step_s = even_step_s(data.time_s), capacity_c = 3'600 * data.capacity_ah;
-  const DiscreteCoefficients c{m.model.b[0], m.model.b[1], m.model.b[2], m.model.f[0], m.model.f[1]};
-  const Intersample input =
-      m.kind == LinearKind::transfer_function ? Intersample::zero_order_hold : Intersample::first_order_hold;
+  const DiscreteModel& linear = m.blocks.linear;
+  const DiscreteCoefficients c{linear.b[0], linear.b[1], linear.b[2], linear.f[0], linear.f[1]};
+  const Intersample input = input_of(m.kind);
   const CircuitResult reading = circuit_from_discrete(c, step_s, capacity_c, input);
   const CircuitParameters std = circuit_std(c, u.covariance.topLeftCorner<5, 5>(), step_s, capacity_c, input);
   const CircuitParameters std_white =
@@ -108,76 +58,140 @@ void set_circuit(const LinearModel& m, const Data& data, double soc, const Uncer
   add("r0_ohm", &CircuitParameters::r0_ohm);
   add("r1_ohm", &CircuitParameters::r1_ohm);
   add("c1_f", &CircuitParameters::c1_f);
+  const bool tf = m.kind == LinearKind::transfer_function;
+  const char* const names[] = {tf ? "c0" : "b_1", tf ? "c1" : "b_2", tf ? "c2" : "b_3", tf ? "a1" : "f_1",
+                               tf ? "a2" : "f_2"};
+  const double values[] = {c.c0, c.c1, c.c2, c.a1, c.a2};
+  for (Eigen::Index k = 0; k < 5; ++k)
+    found.polynomials.push_back(
+        {.name = names[k], .soc = soc, .value = values[k], .std = u.std(k), .std_white = u.std_white(k)});
   for (const std::string& what : reading.implausible)
     found.warnings.push_back("no_circuit: " + what +
                              "; the model follows the voltage, but it does not describe a circuit");
 }
 
+/// A search and its result.
+struct Searched {
+  HammersteinWiener blocks;
+  LeastSquares problem;
+  Optimum found;
+};
+
+/// The linear block, from its start.
+Searched search_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
+                       Method method, const LinearOptions& options) {
+  Searched s;
+  s.blocks.structure = kind == LinearKind::transfer_function
+                           ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)])
+                           : output_error();
+  const DiscreteModel start =
+      options.start ? model_of(*options.start, kind, s.blocks.structure, data) : start_values(data, s.blocks.structure);
+  const Eigen::VectorXd x = to_unknowns(start, s.blocks.structure);
+  s.problem = simulation_error(data, s.blocks.structure, x);
+  s.found = minimise(s.problem, x, method, options.stopping);
+  s.blocks.linear = to_model(s.found.x, s.blocks.structure);
+  return s;
+}
+
+/// The problem with the linear block fixed.
+LeastSquares curves_only(const LeastSquares& whole, const Eigen::VectorXd& start, Eigen::Index linear) {
+  LeastSquares p;
+  const Eigen::Index n = start.size() - linear;
+  p.scale = whole.scale.tail(n);
+  p.evaluate = [&whole, start, n](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
+    Eigen::VectorXd all = start;
+    all.tail(n) = x;
+    Eigen::MatrixXd of_all;
+    if (!whole.evaluate(all, r, jacobian != nullptr ? &of_all : nullptr)) return false;
+    if (jacobian != nullptr) *jacobian = of_all.rightCols(n);
+    return true;
+  };
+  return p;
+}
+
+/// Everything at once, and after the curves alone; the better of both ends.
+Searched search_curves(const Searched& linear, const model::CellParameters<>& cell, const Data& data, double soc,
+                       Method method, const Stopping& stopping) {
+  Searched s;
+  s.blocks = begin_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc);
+  s.problem = simulation_error(data, s.blocks);
+  Eigen::VectorXd x = to_unknowns(s.blocks);
+  const auto first = static_cast<Eigen::Index>(s.blocks.structure.unknowns());
+  s.found = minimise(s.problem, x, method, stopping);
+  x.tail(x.size() - first) =
+      minimise(curves_only(s.problem, x, first), x.tail(x.size() - first), Method::trust_region_reflective, stopping).x;
+  Optimum staged = minimise(s.problem, x, method, stopping);
+  if (staged.cost < s.found.cost) s.found = std::move(staged);
+  s.blocks = with_unknowns(s.blocks, s.found.x);
+  return s;
+}
+
 }  // namespace
 
-LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
-                                     Method method, const Stopping& stopping) {
+LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& given,
+                                     double soc, Method method, const LinearOptions& options) {
+  const EvenData even = evenly_sampled(given);
+  const Data& data = even.data;
+  const bool hw = kind == LinearKind::hammerstein_wiener;
+  Searched s = search_linear(kind, cell, data, soc, hw ? Method::trust_region_reflective : method, options);
+  if (hw) s = search_curves(s, cell, data, soc, method, options.stopping);
   LinearIdentification out;
   LinearModel& m = out.model;
   Identification& found = out.identification;
+  out.data = data;
   m.kind = kind;
-  m.structure = kind == LinearKind::transfer_function
-                    ? transfer_function(cell.ocv.b0_v[model::cell_detail::ocv_piece(cell.ocv, soc)])
-                    : output_error();
-  Eigen::VectorXd start = to_unknowns(start_values(data, m.structure), m.structure);
-  const Eigen::Index linear = start.size();
-  const LeastSquares problem = kind == LinearKind::hammerstein_wiener ? begin_curve(data, start, stopping, m)
-                                                                      : simulation_error(data, m.structure, start);
-  found.optimum = minimise(problem, start, method, stopping);
-  const Eigen::VectorXd& x = found.optimum.x;
-  m.model = to_model(x.head(linear), m.structure);
-  for (Eigen::Index k = linear; k < x.size(); ++k) m.curve.y_v[static_cast<std::size_t>(k - linear + 1)] = x[k];
-
+  m.blocks = s.blocks;
+  found.optimum = s.found;
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  if (!problem.evaluate(x, residuals, &jacobian))
+  if (!s.problem.evaluate(s.found.x, residuals, &jacobian))
     throw std::invalid_argument("the simulation of the identified model is not finite");
-  const Uncertainty u = uncertainty(residuals, jacobian, residuals.size(), found.optimum.at_bound, 0);
+  const auto samples = static_cast<Eigen::Index>(data.size());
+  const Uncertainty u = uncertainty(residuals, jacobian, samples, found.optimum.at_bound, 0);
   found.correlation = u.correlation;
   found.correlation_length = u.correlation_length;
-  found.fading = fading(residuals);
-  found.estimation = fit_of(data.voltage_v, simulated(m, data), data.current_a, found.fading);
+  found.fading = fading(residuals.head(samples));
+  found.estimation = fit_of(data.voltage_v, simulate(m.blocks, data.current_a), data.current_a, found.fading);
   found.estimation.output_variance_v2 = u.output_variance_v2;
   set_circuit(m, data, soc, u, found);
-  if (!stable(m.model.f))
-    found.warnings.push_back(fmt::format("unstable: the model has a pole at {:.6f}", largest_pole(m.model.f)));
+  const std::vector<double>& f = m.blocks.linear.f;
+  if (!stable(f)) found.warnings.push_back(fmt::format("unstable: the model has a pole at {:.6f}", largest_pole(f)));
+  if (even.resampled) {
+    found.warnings.push_back(
+        fmt::format("resampled: the sampling is uneven, so this model uses the recording resampled to {:.3g} s; {} "
+                    "samples lie in gaps",
+                    even.step_s, even.gap_samples));
+  }
   if (!found.optimum.converged) found.warnings.push_back("not_converged: " + found.optimum.reason);
   return out;
 }
 
-FitStatistics validate(const LinearModel& model, const Data& data, double fading) {
-  LinearModel m = model;
-  m.model.initial_v.assign(m.model.f.size(), 0);
+FitStatistics validate(const LinearModel& model, const Data& given, double fading) {
+  const Data data = evenly_sampled(given).data;
+  HammersteinWiener m = model.blocks;
+  m.linear.initial_v.assign(m.linear.f.size(), 0);
   Eigen::MatrixXd jacobian;
-  const Eigen::VectorXd w = simulate(m.model, data.current_a, &jacobian);
-  const auto nf = static_cast<Eigen::Index>(m.model.f.size());
+  const Eigen::VectorXd w = simulate(m.linear, m.input.through(data.current_a), &jacobian);
+  const auto nf = static_cast<Eigen::Index>(m.linear.f.size());
   // The free response is linear in its start. Behind the curve it is fitted with the slope of the curve, in a few
   // iterations.
   Eigen::VectorXd initial = Eigen::VectorXd::Zero(nf);
   const auto free = jacobian.rightCols(nf);
-  for (int pass = 0; pass < (m.curve.y_v.empty() ? 1 : 10); ++pass) {
+  for (int pass = 0; pass < (m.output.y_v.empty() ? 1 : 10); ++pass) {
     const Eigen::VectorXd now = w + free * initial;
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(nf, nf);
     Eigen::VectorXd right = Eigen::VectorXd::Zero(nf);
     for (Eigen::Index k = 0; k < now.size(); ++k) {
       const double measured_v = data.voltage_v[static_cast<std::size_t>(k)];
       if (!std::isfinite(measured_v) || !std::isfinite(now[k])) continue;
-      constexpr double h = 1e-6;
-      const double slope =
-          m.curve.y_v.empty() ? 1 : (through(m.curve, now[k] + h) - through(m.curve, now[k] - h)) / (2 * h);
-      const Eigen::VectorXd row = slope * free.row(k).transpose();
+      const Eigen::VectorXd row = m.output.slope(now[k]) * free.row(k).transpose();
       normal += row * row.transpose();
-      right += row * (measured_v - through(m.curve, now[k]));
+      right += row * (measured_v - m.output.through(now[k]));
     }
     initial += normal.completeOrthogonalDecomposition().solve(right);
   }
-  m.model.initial_v.assign(initial.data(), initial.data() + nf);
-  return fit_of(data.voltage_v, simulated(m, data), data.current_a, fading);
+  m.linear.initial_v.assign(initial.data(), initial.data() + nf);
+  return fit_of(data.voltage_v, simulate(m, data.current_a), data.current_a, fading);
 }
 
 }  // namespace bms::identification

@@ -1,50 +1,54 @@
-// The linear models of the paper, and the one with a static nonlinearity behind it (3.2.1-3.2.3), from recording to
+// The linear models of the paper, and the one with static nonlinearities around it (3.2.1-3.2.3), from recording to
 // circuit.
 //
 //   tf   transfer function, Eq. 11: voltage minus b0 of the OCV line
 //   oe   output error, Eq. 18-22: one sample of delay, offset estimated
-//   hw   Hammerstein-Wiener: oe with its output w passed through a curve of straight pieces, y = g(w), starting at
-//        y = w
+//   hw   Hammerstein-Wiener: oe between two curves (hammerstein_wiener.hpp)
 //
-// All three minimise their simulation error, on evenly sampled data. Eq. 12-16 give the circuit. A parameter that is
-// negative or not finite there is reported and not clamped.
+// All three minimise their simulation error, on evenly sampled data; others are resampled (resample.hpp), which a
+// warning says. Eq. 12-16 give the
+// circuit. A parameter that is negative or not finite there is reported and not clamped.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "identification/discrete_model.hpp"
+#include "identification/circuit_from_discrete.hpp"
+#include "identification/hammerstein_wiener.hpp"
 #include "identification/identify.hpp"
 
 namespace bms::identification {
 
 enum class LinearKind { transfer_function, output_error, hammerstein_wiener };
 
-/// The curve of hw: y at even steps of w, straight beyond its ends. Empty: y = w.
-struct StaticCurve {
-  double w_from_v = 0, w_step_v = 0;
-  std::vector<double> y_v;
-};
-
 struct LinearModel {
   LinearKind kind = LinearKind::transfer_function;
-  Structure structure;
-  DiscreteModel model;
-  StaticCurve curve;
+  HammersteinWiener blocks;  ///< of tf and oe only the linear block
 };
 
 struct LinearIdentification {
-  /// Parameters b1_v, r0_ohm, r1_ohm, c1_f at the middle SOC of the recording; no initial states, no cell.
+  /// Parameters b1_v, r0_ohm, r1_ohm, c1_f at the middle SOC of the recording, and the polynomials; no initial states,
+  /// no cell.
   Identification identification;
   LinearModel model;
+  Data data;  ///< that the model was identified from: even, resampled if the recording was not
 };
 
-/// soc: at the middle of the recording. cell: its OCV gives b0 of tf. Throws std::invalid_argument as
-/// simulation_error() and start_values().
-LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
-                                     Method method, const Stopping& stopping = {});
+struct LinearOptions {
+  /// Circuit to start from, as the paper does with Appendix A through Eq. 12-16; empty: start values without a search
+  /// (start_values()). hw starts from the oe that this start leads to, with its curves
+  /// identified around it.
+  std::optional<CircuitParameters> start = std::nullopt;
+  Stopping stopping = {};
+};
 
-/// Simulation over other data; only the free response is fitted.
+/// soc: at the middle of the recording. cell: its OCV gives b0 of tf and the start of the curve of hw. Throws
+/// std::invalid_argument as simulation_error() and start_values().
+LinearIdentification identify_linear(LinearKind kind, const model::CellParameters<>& cell, const Data& data, double soc,
+                                     Method method, const LinearOptions& options = {});
+
+/// Simulation over other data, resampled if they are uneven; only the free response is fitted.
 FitStatistics validate(const LinearModel& model, const Data& data, double fading);
 
 }  // namespace bms::identification

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <optional>
 #include <stdexcept>
 
@@ -16,11 +15,12 @@ namespace bms::identification {
 
 namespace {
 
-constexpr double steady_part = 0.05;  // largest relative difference of samples of the same load
-constexpr double load_line_s = 20;    // longest line under load
-constexpr double plain_line_s = 5;    // the same where tau and R1 are not known, because the voltage then bends
-constexpr double partial = 0.02;      // a last loaded sample that is smaller by this part contains the step
-constexpr std::size_t fewest = 6;     // samples of a rest: three unknowns and three degrees of freedom
+constexpr double printed_fraction = 0.633;  // of Eq. A3; 1 - 1/e is 0.632
+constexpr double steady_part = 0.05;        // largest relative difference of samples of the same load
+constexpr double load_line_s = 20;          // longest line under load
+constexpr double plain_line_s = 5;          // the same where tau and R1 are not known, because the voltage then bends
+constexpr double partial = 0.02;            // a last loaded sample that is smaller by this part contains the step
+constexpr std::size_t fewest = 6;           // samples of a rest: three unknowns and three degrees of freedom
 
 /// Samples of one rest. The load before it ends with sample `loaded`.
 struct Rest {
@@ -48,37 +48,25 @@ AtZero line_at_zero(const Trace& trace) {
   return {v_mean - tv / tt * t_mean, 1 / n + t_mean * t_mean / tt};
 }
 
-/// Median of the finite voltages of [from, to).
-double median_voltage(const Data& data, std::size_t from, std::size_t to) {
-  std::vector<double> v;
-  for (std::size_t k = from; k < to; ++k) {
-    if (std::isfinite(data.voltage_v[k])) v.push_back(data.voltage_v[k]);
+/// The first finite voltage from a sample on, in steps of +1 or -1 sample; NaN without one.
+double nearest_voltage(const Data& data, std::size_t from, std::size_t count, int step) {
+  for (std::size_t k = 0; k < count; ++k) {
+    const double v = data.voltage_v[step > 0 ? from + k : from - k];
+    if (std::isfinite(v)) return v;
   }
-  return v.empty() ? NAN : measurement::median(v);
+  return NAN;
 }
 
 PointReading points_of(const Data& data, const Rest& rest, double step_a) {
   PointReading p;
-  // samples of the same point: within 1 % of the rest, on the same side of the step
-  const double near_s = 0.01 * (data.time_s[rest.end - 1] - rest.step_s);
-  const auto within = [&](std::size_t k, std::size_t centre) {
-    return std::abs(data.time_s[k] - data.time_s[centre]) <= near_s;
-  };
-  std::size_t a = rest.loaded, b = rest.begin + 1, c = rest.end - 1;
-  while (a > 0 && within(a - 1, rest.loaded) &&
-         std::abs(data.current_a[a - 1] - data.current_a[rest.loaded]) <
-             steady_part * std::abs(data.current_a[rest.loaded]))
-    --a;
-  while (b < rest.end && within(b, rest.begin)) ++b;
-  while (c > rest.begin && within(c - 1, rest.end - 1)) --c;
-  p.a_v = median_voltage(data, a, rest.loaded + 1);
-  p.b_v = median_voltage(data, rest.begin, b);
-  p.c_v = median_voltage(data, c, rest.end);
-  p.d_v = p.b_v + (1 - 1 / std::numbers::e) * (p.c_v - p.b_v);
+  p.a_v = nearest_voltage(data, rest.loaded, rest.loaded + 1, -1);
+  p.b_v = nearest_voltage(data, rest.begin, rest.end - rest.begin, 1);
+  p.c_v = nearest_voltage(data, rest.end - 1, rest.end - rest.begin, -1);
+  p.d_v = p.b_v + printed_fraction * (p.c_v - p.b_v);
   p.time_constant_s = NAN;
   double before_v = p.b_v, before_s = data.time_s[rest.begin];
   for (std::size_t k = rest.begin + 1; k < rest.end; ++k) {
-    const double v = median_voltage(data, std::max(rest.begin, k - 2), std::min(k + 3, rest.end));
+    const double v = data.voltage_v[k];
     if (!std::isfinite(v)) continue;
     if ((v - p.d_v) * (p.c_v - p.b_v) >= 0) {
       const double part = v == before_v ? 1 : std::clamp((p.d_v - before_v) / (v - before_v), 0.0, 1.0);

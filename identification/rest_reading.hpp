@@ -38,7 +38,7 @@ struct RestReadingOptions {
   double largest_std = 0.25;  ///< largest relative standard deviation of tau for R1 and C1
 };
 
-/// Appendix A as printed, but a, b, c are medians over the samples within 1 % of the rest.
+/// Appendix A as printed: a is the last voltage under load, b the first one after the step, c the last one of the rest.
 struct PointReading {
   double a_v = 0, b_v = 0, c_v = 0, d_v = 0;
   double time_constant_s = 0;  ///< T

@@ -27,7 +27,9 @@ files::PageTable parameter_table(const id::Identification& found) {
       {"name", "SOC", "value", "standard deviation", "for white residuals", "effect of the OCV tolerance", "remarks"},
       {},
       ""};
-  for (const id::Parameter& p : found.parameters) {
+  std::vector<id::Parameter> all = found.parameters;
+  all.insert(all.end(), found.polynomials.begin(), found.polynomials.end());
+  for (const id::Parameter& p : all) {
     table.rows.push_back({text_cell(p.name), text_cell(fmt::format("{:.0f} %", 100 * p.soc)),
                           text_cell(fmt::format("{:.5g}", p.value)), text_cell(fmt::format("{:.2g}", p.std)),
                           text_cell(fmt::format("{:.2g}", p.std_white)),

@@ -150,6 +150,7 @@ Json fit_of(const identification::FitStatistics& f) {
           {"rmse_v", f.rmse_v},
           {"largest_v", f.largest_v},
           {"one_step_fit_percent", f.one_step_fit_percent},
+          {"corrected_one_step_fit_percent", f.corrected_one_step_fit_percent},
           {"ahead", std::move(ahead)},
           {"output_variance_v2", f.output_variance_v2},
           {"samples", f.samples},
@@ -264,6 +265,7 @@ std::string json_of(const workflow::IdentifyResult& r) {
   json["out"] = r.out;
   json["samples"] = i.estimation.samples;
   json["parameters"] = parameters_of(i.parameters);
+  if (!i.polynomials.empty()) json["polynomials"] = parameters_of(i.polynomials);
   json["correlation"] = matrix_of(i.correlation);
   json["estimation"] = fit_of(i.estimation);
   json["validation"] = r.validation ? fit_of(*r.validation) : Json(nullptr);
@@ -291,35 +293,6 @@ std::string json_of(const workflow::IdentifyResult& r) {
   json["starts"] = i.starts;
   json["starts_agreeing"] = i.agreeing;
   json["wall_s"] = r.wall_s;
-  json["warnings"] = warnings_of(r.warnings);
-  return text_of(json);
-}
-
-std::string json_of(const study::StudyResult& r) {
-  Json json;
-  json["command"] = "study";
-  json["source"] = r.source;
-  json["tables"] = Json::array();
-  for (const files::PageTable& t : r.tables) {
-    Json rows = Json::array();
-    for (const auto& row : t.rows) {
-      Json cells = Json::array();
-      for (const files::PageCell& c : row) {
-        Json cell = {{"text", c.text}};
-        if (c.value) cell["value"] = *c.value;
-        if (c.paper) cell["paper"] = *c.paper;
-        cells.push_back(std::move(cell));
-      }
-      rows.push_back(std::move(cells));
-    }
-    json["tables"].push_back(
-        {{"id", t.id}, {"title", t.title}, {"head", t.head}, {"rows", std::move(rows)}, {"note", t.note}});
-  }
-  json["claims"] = Json::array();
-  for (const study::StudyClaim& c : r.claims)
-    json["claims"].push_back({{"claim", c.claim}, {"holds", c.holds}, {"evidence", c.result}});
-  json["identifications"] = r.fits;
-  json["wall_s"] = r.seconds;
   json["warnings"] = warnings_of(r.warnings);
   return text_of(json);
 }

@@ -8,6 +8,7 @@
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation_result.hpp"
 #include "proof/proof.hpp"
+#include "study/diagnose_paper.hpp"
 #include "study/study.hpp"
 #include "workflow/diagnosis_result.hpp"
 #include "workflow/identify_cell.hpp"
@@ -24,6 +25,7 @@ std::string json_of(const host_sim::SimulationResult& result);
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
 std::string json_of(const workflow::IdentifyResult& result);
 std::string json_of(const workflow::DiagnoseResult& result);
+std::string json_of(const study::PaperDiagnosis& diagnosis);
 std::string json_of(const study::StudyResult& result);
 std::string json_of(const proof::ProofResult& result);
 

@@ -244,13 +244,20 @@ std::string policy_in(std::string_view page) {
 
 namespace {
 
+/// Of the value from the paper's number: points of percent, or a part of it.
+std::string difference_of(const files::PageCell& c) {
+  if (!c.value || !std::isfinite(*c.value)) return "";
+  if (c.text.find('%') != std::string::npos) return fmt::format(" ({:+.1f} points)", *c.value - *c.paper);
+  return *c.paper != 0 ? fmt::format(" ({:+.0f} %)", 100 * (*c.value / *c.paper - 1)) : "";
+}
+
 json table_of(const files::PageTable& t) {
   json rows = json::array();
   for (const auto& row : t.rows) {
     json cells = json::array();
     for (const files::PageCell& c : row) {
       json cell = {{"text", c.text}};
-      if (c.paper) cell["paper"] = fmt::format("{:g}", *c.paper);
+      if (c.paper) cell["paper"] = fmt::format("{:g}{}", *c.paper, difference_of(c));
       cells.push_back(std::move(cell));
     }
     rows.push_back(std::move(cells));
@@ -281,6 +288,7 @@ json chart_of(const files::PageChart& c) {
   }
   json chart = {{"labels", c.labels}, {"rows", std::move(rows)}, {"bands", !c.half_band.empty()}};
   if (!time) chart["x"] = c.x_title;
+  if (!c.right.empty()) chart["right"] = c.right;
   return {{"title", c.title}, {"chart", std::move(chart)}};
 }
 

@@ -12,16 +12,22 @@ namespace bms::study {
 
 namespace {
 
+/// Fields of a line. Empty if a quote does not end.
 std::vector<std::string> fields_of(const std::string& line) {
   std::vector<std::string> fields(1);
+  bool quoted = false;
   for (const char c : line) {
-    if (c == ',')
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
       fields.emplace_back();
     else
       fields.back() += c;
   }
-  return fields;
+  return quoted ? std::vector<std::string>() : fields;
 }
+
+bool is_text_table(const std::string& name) { return !name.starts_with("table"); }
 
 }  // namespace
 
@@ -53,11 +59,42 @@ PaperTable::PaperTable(const std::string& text, const std::string& path) {
     throw files::BadInput(path, std::max<std::size_t>(number, 1), "no rows, expected a header and rows");
 }
 
+TextTable::TextTable(const std::string& text, const std::string& path) {
+  std::istringstream lines(text);
+  std::size_t number = 0;
+  for (std::string line; std::getline(lines, line);) {
+    ++number;
+    if (line.empty() || line.starts_with('#')) continue;
+    std::vector<std::string> fields = fields_of(line);
+    if (fields.empty()) throw files::BadInput(path, number, "a quote without end, expected one more quote");
+    if (head_.empty()) {
+      head_ = std::move(fields);
+      continue;
+    }
+    if (fields.size() != head_.size())
+      throw files::BadInput(path, number,
+                            fmt::format("{} fields, expected {} as in the header", fields.size(), head_.size()));
+    rows_.push_back(std::move(fields));
+  }
+}
+
+const TextTable& text_table(const std::string& name) {
+  static const std::map<std::string, TextTable> tables = [] {
+    std::map<std::string, TextTable> all;
+    for (const PaperTableText& file : paper_table_texts()) {
+      if (is_text_table(file.name)) all.emplace(file.name, TextTable(file.text, "study/paper/" + file.name + ".csv"));
+    }
+    return all;
+  }();
+  return tables.at(name);
+}
+
 const PaperTable& paper_table(int number) {
   static const std::map<std::string, PaperTable> tables = [] {
     std::map<std::string, PaperTable> all;
-    for (const PaperTableText& file : paper_table_texts())
-      all.emplace(file.name, PaperTable(file.text, "study/paper/" + file.name + ".csv"));
+    for (const PaperTableText& file : paper_table_texts()) {
+      if (!is_text_table(file.name)) all.emplace(file.name, PaperTable(file.text, "study/paper/" + file.name + ".csv"));
+    }
     return all;
   }();
   return tables.at(fmt::format("table{}", number));

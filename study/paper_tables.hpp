@@ -24,7 +24,23 @@ class PaperTable {
   std::vector<std::vector<double>> rows_;
 };
 
-/// Table 4 to 9. Throws std::out_of_range for other numbers.
+/// Rows of text. In the file the first line names the columns; a field with a comma is quoted.
+class TextTable {
+ public:
+  /// Throws BadInput where a row has another number of fields than the header, or a quote does not end.
+  TextTable(const std::string& text, const std::string& path);
+  const std::vector<std::string>& head() const { return head_; }
+  const std::vector<std::vector<std::string>>& rows() const { return rows_; }
+
+ private:
+  std::vector<std::string> head_;
+  std::vector<std::vector<std::string>> rows_;
+};
+
+/// "statements", "errata" or "audit". Throws std::out_of_range for other names.
+const TextTable& text_table(const std::string& name);
+
+/// Table 1 and 4 to 9. Throws std::out_of_range for other numbers.
 const PaperTable& paper_table(int number);
 
 struct PaperTableText {

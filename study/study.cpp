@@ -11,6 +11,8 @@
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
+#include "study/best_experiment.hpp"
+#include "study/statistics.hpp"
 #include "study/study_tables.hpp"
 #include "workflow/identification_data.hpp"
 
@@ -20,13 +22,9 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-/// The paper's experiments with pulses, in the order of its tables; the OCV test follows them.
-constexpr std::array pulse_experiments = {"rest_30s",        "rest_18s",         "rest_5s",
-                                          "high_1m_low_30s", "high_30s_low_30s", "high_30s_low_1m"};
-constexpr std::size_t filtered_experiment = 3;
 constexpr double pulse_start_soc = 0.41;
-
-constexpr std::size_t model_fits = models * methods.size(), filter_fits = 5, soc_fits = 10;
+constexpr int ocv_steps = 10;
+constexpr std::size_t model_fits = 2 * models * methods.size(), filter_fits = 6;
 
 /// Figures 9 to 11.
 void add_profile_charts(StudyResult& result) {
@@ -44,35 +42,53 @@ void add_profile_charts(StudyResult& result) {
 }
 
 void finish(const Fitter& fitter, Clock::time_point begin, StudyResult& result) {
-  result.fits = fitter.done();
+  result.fits += fitter.done();
   result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
 }  // namespace
 
-StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed, const StudyProgress& progress) {
+StudyResult study_plant(const model::CellParameters<>& cell, const StudyOptions& options,
+                        const StudyProgress& progress) {
   const auto begin = Clock::now();
   StudyResult result;
   result.source = "the plant (Table 9 made smooth), samples every second with 1 mV and 10 mA of noise";
-  Fitter fitter(cell, model_fits + pulse_experiments.size() + 1 + filter_fits + soc_fits, progress);
+  Fitter fitter(cell, model_fits + paper_experiments + filter_fits + 1, progress);
+  std::uint64_t seed = options.seed;
+  const Bench bench;
+  show_ocv_test(bench, seed, result);
   add_profile_charts(result);
 
-  const StudyData ocv = run_on_plant("ocv_10min_rest", 1, seed);
-  compare_models(fitter, window(ocv, "OCV test with 10 min rest, 80 to 50 %", 0.8, 0.5),
-                 window(ocv, "OCV test with 10 min rest, 50 to 20 %", 0.5, 0.2), true, result);
+  Observations observed;
+  const StudyData ocv = run_ocv_test(ocv_steps, bench, seed, true);
+  const StudyData estimation = window(ocv, "OCV test with 10 min rest, 80 to 50 %", 0.8, 0.5);
+  compare_models(fitter, estimation, window(ocv, "OCV test with 10 min rest, 50 to 20 %", 0.5, 0.2), true, observed,
+                 result);
+  show_appendix_a(ocv, result);
 
   std::vector<StudyData> parts;
-  for (const char* name : pulse_experiments) parts.push_back(run_on_plant(name, pulse_start_soc, ++seed));
-  parts.push_back(window(run_on_plant("ocv_1h_rest", 1, ++seed), "ocv_1h_rest, 50 to 30 %", 0.5, 0.3));
-  cross_validate(fitter, parts, true, result);
-  compare_filters(fitter, parts[filtered_experiment], result);
-  identify_over_soc(fitter, seed, result);
+  for (std::size_t k = 0; k < ocv_experiment; ++k)
+    parts.push_back(run_on_bench(experiment_names[k], pulse_start_soc, bench, ++seed));
+  parts.push_back(window(run_on_bench("ocv_1h_rest", 1, bench, ++seed, 0.29), "ocv_1h_rest, 50 to 30 %", 0.5, 0.3));
+  cross_validate(fitter, parts, true, observed, result);
+  show_initial_states(fitter, estimation, parts[burst_experiment], observed, result);
+  compare_filters(fitter, parts[burst_experiment], result);
+  identify_over_soc(fitter, bench, seed, result);
+  show_errata(result);
+  observed.not_run = "this run has no numbers for it; the table of shares has";
+  judge_all(observed, result);
+  if (options.seeds > 0) {
+    add_statistics(cell, options.seeds, options.seed, {}, result);
+    add_success_maps(cell, options.seed, result);
+    add_best_experiment(result);
+  }
+  show_audit(result);
   finish(fitter, begin, result);
   return result;
 }
 
 StudyResult study_recordings(const model::CellParameters<>& cell, const std::vector<std::string>& paths,
-                             const StudyProgress& progress) {
+                             const StudyOptions& options, const StudyProgress& progress) {
   const auto begin = Clock::now();
   if (paths.size() < 2)
     throw files::BadInput("--recordings", 1,
@@ -89,8 +105,12 @@ StudyResult study_recordings(const model::CellParameters<>& cell, const std::vec
         {std::filesystem::path(path).stem().string(), d.record.data, d.record.initial_soc, d.soc_min, d.soc_max});
   }
   Fitter fitter(cell, model_fits + parts.size(), progress);
-  compare_models(fitter, parts[0], parts[1], false, result);
-  cross_validate(fitter, parts, false, result);
+  Observations observed;
+  observed.not_run = "the recordings are not the experiments of the paper";
+  compare_models(fitter, parts[0], parts[1], false, observed, result);
+  cross_validate(fitter, parts, false, observed, result);
+  judge_all(observed, result);
+  if (options.seeds > 0) add_statistics(cell, options.seeds, options.seed, parts, result);
   finish(fitter, begin, result);
   return result;
 }

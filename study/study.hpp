@@ -7,6 +7,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,17 +17,31 @@
 
 namespace bms::study {
 
-/// A statement of the paper, and whether it holds here.
+/// A statement, and whether it holds in the run that the tables show.
 struct StudyClaim {
   std::string claim;
-  std::string result;  ///< what was found
-  bool holds = false;
+  std::string result;         ///< what was found, or why it is not judged
+  std::optional<bool> holds;  ///< missing: not judged
+};
+
+/// Runs of one kind of cell in which a statement holds, of those in which it can be judged; 95 % interval (Wilson).
+struct StatementShare {
+  std::string plant;
+  std::size_t holds = 0, judged = 0;
+  double low = 0, high = 1;
+  std::string example;  ///< what one run observed, or why it is not judged
+};
+
+struct StatementResult {
+  std::string id, where, text, rule;
+  std::vector<StatementShare> shares;
 };
 
 struct StudyResult {
   std::string source;  ///< the data of the study
   std::vector<files::PageTable> tables;
   std::vector<StudyClaim> claims;
+  std::vector<StatementResult> statements;
   std::vector<files::PageChart> charts;
   std::vector<measurement::Warning> warnings;
   std::size_t fits = 0;  ///< number of identifications
@@ -36,12 +51,19 @@ struct StudyResult {
 /// done: identifications that are finished, of `all`.
 using StudyProgress = std::function<void(std::size_t done, std::size_t all)>;
 
-/// The whole study on the plant, with 1 mV and 10 mA of noise. seed: of the noise.
-StudyResult study_plant(const model::CellParameters<>& cell, std::uint64_t seed, const StudyProgress& progress);
+struct StudyOptions {
+  std::uint64_t seed = 1;  ///< of the noise, and the first of the statistics
+  std::size_t seeds = 20;  ///< cells of each kind; 0: no statistics and no success maps
+};
 
-/// Models, optimisers and cross-validation on recordings. The models are identified from the first recording and
-/// validated with the second. Throws BadInput if there are fewer than two, or one cannot be used.
+/// The whole study on the plant, with 1 mV and 10 mA of noise.
+StudyResult study_plant(const model::CellParameters<>& cell, const StudyOptions& options,
+                        const StudyProgress& progress);
+
+/// The same with models, optimisers and cross-validation on recordings instead of the plant. The models are identified
+/// from the first recording and validated with the second. Throws BadInput if there are fewer than two, or one cannot
+/// be used.
 StudyResult study_recordings(const model::CellParameters<>& cell, const std::vector<std::string>& paths,
-                             const StudyProgress& progress);
+                             const StudyOptions& options, const StudyProgress& progress);
 
 }  // namespace bms::study

@@ -1,6 +1,9 @@
 #include "study/study_data.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <vector>
 
 #include "experiments/experiment.hpp"
 #include "host_sim/gaussian_noise.hpp"
@@ -11,8 +14,9 @@ namespace bms::study {
 namespace {
 
 constexpr double nominal_capacity_ah = 6, ambient_c = 20;
-constexpr double current_noise_a = 0.010, voltage_noise_v = 0.001;
 constexpr double window_margin_soc = 0.001;
+constexpr double plant_step_s = 1;  // of Runge-Kutta 4, against time constants of 10 s and more
+constexpr double ocv_rest_s = 600;
 
 void add(StudyData& part, double time_s, double current_a, double voltage_v, double soc) {
   part.data.time_s.edit().push_back(time_s);
@@ -22,23 +26,108 @@ void add(StudyData& part, double time_s, double current_a, double voltage_v, dou
   part.soc_max = std::max(part.soc_max, soc);
 }
 
-}  // namespace
+plant::MonotoneCurve scaled(const plant::MonotoneCurve& curve, double factor) {
+  constexpr int nodes = 20;
+  std::vector<plant::Point> points;
+  for (int k = 0; k <= nodes; ++k) {
+    const double soc = static_cast<double>(k) / nodes;
+    points.push_back({soc, factor * curve.at(soc)});
+  }
+  return plant::MonotoneCurve(points);
+}
 
-StudyData run_on_plant(const std::string& experiment, double soc_from, std::uint64_t seed) {
-  const auto profile = experiments::experiment(experiment).value();
-  plant::Cell cell({}, {.soc = soc_from, .v_rc_v = 0, .temperature_c = ambient_c});
+plant::CellParameters plant_of(const Bench& bench) {
+  plant::CellParameters p;
+  p.step_s = plant_step_s;
+  const auto scale = [](plant::MonotoneCurve& curve, double factor) {
+    if (factor != 1) curve = scaled(curve, factor);
+  };
+  scale(p.circuit.r0_ohm, bench.r0_factor);
+  scale(p.circuit.r1_ohm, bench.r1_factor);
+  scale(p.circuit.c1_f, bench.c1_factor);
+  return p;
+}
+
+/// The voltages that the equations of the paper leave out, exact for a constant current.
+class LeftOutVoltage {
+ public:
+  LeftOutVoltage(const LeftOut& what, double branch) : what_(what), branch_(branch) {}
+
+  void run(double current_a, double duration_s) {
+    const double moved = what_.decay * std::abs(current_a) * duration_s / (3'600 * nominal_capacity_ah);
+    const double target = current_a > 0 ? 1 : -1;
+    branch_ = target + (branch_ - target) * std::exp(-moved);
+    const double steady_v = what_.slow_ohm * current_a;
+    slow_v_ = steady_v + (slow_v_ - steady_v) * std::exp(-duration_s / what_.slow_s);
+  }
+  double voltage_v() const { return what_.half_gap_v * branch_ + slow_v_; }
+
+ private:
+  LeftOut what_;
+  double branch_, slow_v_ = 0;
+};
+
+StudyData run_profile(const std::string& name, const std::vector<experiments::ProfileRow>& profile, double soc_from,
+                      double branch, const Bench& bench, std::uint64_t seed, double stop_soc = -1) {
+  plant::Cell cell(plant_of(bench), {.soc = soc_from, .v_rc_v = 0, .temperature_c = ambient_c});
+  LeftOutVoltage left_out(bench.left_out, branch);
   host_sim::GaussianNoise noise(seed);
-  StudyData part{experiment, {}, soc_from, 1, 0};
+  StudyData part{name, {}, soc_from, 1, 0};
   part.data.capacity_ah = nominal_capacity_ah;
   double before_s = 0;
   for (const experiments::ProfileRow& row : profile) {
-    if (row.time_s > before_s) cell.run(row.current_a, ambient_c, row.time_s - before_s);
+    if (row.time_s > before_s) {
+      cell.run(row.current_a, ambient_c, row.time_s - before_s);
+      left_out.run(row.current_a, row.time_s - before_s);
+    }
     before_s = row.time_s;
-    const double current_a = row.current_a + current_noise_a * noise.next();
-    const double voltage_v = cell.voltage_v() + voltage_noise_v * noise.next();
+    if (cell.soc() < stop_soc) break;
+    const double current_a = row.current_a + bench.current_offset_a + bench.current_noise_a * noise.next();
+    const double voltage_v = cell.voltage_v() + left_out.voltage_v() + bench.voltage_noise_v * noise.next();
     add(part, row.time_s, current_a, voltage_v, cell.soc());
   }
   return part;
+}
+
+}  // namespace
+
+StudyData run_on_bench(const std::string& experiment, double soc_from, const Bench& bench, std::uint64_t seed,
+                       double stop_soc) {
+  const bool ocv = experiment.starts_with("ocv"), with_rests = experiment.starts_with("rest");
+  experiments::ExperimentOptions options;
+  const double pulse_c_rate = with_rests ? bench.short_c_rate : bench.long_c_rate;
+  options.high_c_rate = ocv ? bench.ocv_c_rate : pulse_c_rate;
+  options.low_c_rate = bench.low_share * options.high_c_rate;
+  options.step_s = ocv ? bench.ocv_step_s : bench.pulse_step_s;
+  // an OCV test begins full: on the charge branch
+  return run_profile(experiment, experiments::experiment(experiment, options).value(), soc_from,
+                     ocv ? 1 : bench.start_branch, bench, seed, stop_soc);
+}
+
+StudyData run_ocv_test(int steps, const Bench& bench, std::uint64_t seed, bool and_back) {
+  std::vector<experiments::ProfileRow> profile = {{0, 0}};
+  const auto hold = [&](double duration_s, double current_a) {
+    const double from_s = profile.back().time_s;
+    const auto samples = static_cast<int>(std::round(duration_s / bench.ocv_step_s));
+    for (int k = 1; k <= samples; ++k) profile.push_back({from_s + k * bench.ocv_step_s, current_a});
+  };
+  const double current_a = bench.ocv_c_rate * nominal_capacity_ah;
+  hold(ocv_rest_s, 0);
+  for (const double direction : {-1.0, 1.0}) {
+    if (direction > 0 && !and_back) break;
+    for (int k = 0; k < steps; ++k) {
+      hold(3'600 / bench.ocv_c_rate / steps, direction * current_a);
+      hold(ocv_rest_s, 0);
+    }
+  }
+  return run_profile("OCV test with 10 min rest", profile, 1, 1, bench, seed);
+}
+
+StudyData run_currents(const std::string& name, const std::vector<double>& current_a, double soc_from,
+                       const Bench& bench, std::uint64_t seed) {
+  std::vector<experiments::ProfileRow> profile = {{0, 0}};
+  for (const double i : current_a) profile.push_back({profile.back().time_s + 1, i});
+  return run_profile(name, profile, soc_from, bench.start_branch, bench, seed);
 }
 
 StudyData window(const StudyData& whole, const std::string& name, double high_soc, double low_soc) {
@@ -54,6 +143,11 @@ StudyData window(const StudyData& whole, const std::string& name, double high_so
     add(part, data.time_s[k], data.current_a[k], data.voltage_v[k], soc);
   }
   return part;
+}
+
+double true_ocv_v(double soc) {
+  static const plant::MonotoneCurve curve = plant::table9_ocv_v();
+  return curve.at(soc);
 }
 
 }  // namespace bms::study

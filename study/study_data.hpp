@@ -1,10 +1,18 @@
-// Data sets of the study: experiments run on the plant, and parts of them.
+// Data sets of the study: experiments run on a simulated cell, and parts of them.
+//
+// The simulated cell is the plant (plant/), whose circuit is the paper's. On request it also has what the paper's
+// equations leave out: hysteresis and a slow polarisation. Both are written here from their differential equations,
+// independent of model/, which the diagnosis uses:
+//
+//   dh/dt = decay |I| / (3600 C_n) (sgn I - h)        du/dt = (R_slow I - u) / tau_slow        V += half_gap h + u
 #pragma once
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "identification/data.hpp"
+#include "identification/ocv_rest_test.hpp"
 
 namespace bms::study {
 
@@ -17,10 +25,42 @@ struct StudyData {
   double middle_soc() const { return (soc_min + soc_max) / 2; }
 };
 
-/// Runs an experiment (experiments/experiment.hpp) on the plant, with 1 mV and 10 mA of measurement noise.
-StudyData run_on_plant(const std::string& experiment, double soc_from, std::uint64_t seed);
+/// What the equations of the paper leave out. Zero: not there.
+struct LeftOut {
+  double half_gap_v = 0;
+  double decay = 40;  ///< a charge of C_n / decay covers 63 % of the way from one branch to the other
+  double slow_ohm = 0, slow_s = 1'200;
+};
+
+/// A simulated cell, its instruments, and the currents of the experiments, which the paper does not publish.
+struct Bench {
+  LeftOut left_out;
+  double start_branch = 0;  ///< h at the start of pulse experiments: -1 after a discharge, 0 in the middle
+  double r0_factor = 1, r1_factor = 1, c1_factor = 1;
+  double short_c_rate = 1;  ///< of pulses with rests (Fig. 10)
+  double long_c_rate = 1;   ///< HIGH current of the bursts (Fig. 11)
+  double low_share = 0.25;  ///< LOW over HIGH
+  double ocv_c_rate = 1;    ///< of the pulses of the OCV test (Fig. 4)
+  double voltage_noise_v = 0.001, current_noise_a = 0.010, current_offset_a = 0;
+  double pulse_step_s = 1, ocv_step_s = 1;  ///< sampling
+};
+
+/// Runs an experiment (experiments/experiment.hpp) on the simulated cell, until its SOC falls below stop_soc.
+StudyData run_on_bench(const std::string& experiment, double soc_from, const Bench& bench, std::uint64_t seed,
+                       double stop_soc = -1);
+
+/// An OCV test from full to empty, and back if asked for, in `steps` steps each way, with ten minutes of rest after
+/// each.
+StudyData run_ocv_test(int steps, const Bench& bench, std::uint64_t seed, bool and_back);
+
+/// A current of one's own, sampled every second: the mean of each second.
+StudyData run_currents(const std::string& name, const std::vector<double>& current_a, double soc_from,
+                       const Bench& bench, std::uint64_t seed);
 
 /// The discharging half of an OCV test between two states of charge, counted with the nominal capacity.
 StudyData window(const StudyData& whole, const std::string& name, double high_soc, double low_soc);
+
+/// The OCV of the simulated cell in the middle between its branches.
+double true_ocv_v(double soc);
 
 }  // namespace bms::study

@@ -1,6 +1,7 @@
 // Cells of the study's tables.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <string>
 
@@ -38,7 +39,8 @@ inline files::PageCell failed(const std::string& why, std::optional<double> pape
 /// The paper's number, if the study is to be compared with the paper.
 inline std::optional<double> paper_number(bool compare, int table, std::size_t row, std::size_t column) {
   if (!compare) return std::nullopt;
-  return paper_table(table).at(row, column);
+  const double number = paper_table(table).at(row, column);
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
 }
 
 }  // namespace bms::study

@@ -73,9 +73,10 @@ std::string joint_summary(const workflow::JointResult& joint) {
 }
 
 std::string grey_box_summary(const id::Identification& found) {
-  std::string text = fmt::format("{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead {:.1f} %. {}\n",
-                                 found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent,
-                                 found.estimation.one_step_fit_percent, found.optimum.reason);
+  std::string text = fmt::format(
+      "{} samples: {:.2f} mV RMS open loop, fit {:.1f} %, one step ahead with its last error {:.1f} %. {}\n",
+      found.estimation.samples, 1e3 * found.estimation.rmse_v, found.estimation.fit_percent,
+      found.estimation.corrected_one_step_fit_percent, found.optimum.reason);
   for (const id::Parameter& p : found.parameters) {
     text += fmt::format("  {:8} {:3.0f} %{}  {:10.5g} +- {:.2g}{}\n", p.name, 100 * p.soc,
                         p.temperature_c ? fmt::format(" {:5.1f} C", *p.temperature_c) : "", p.value, p.std,

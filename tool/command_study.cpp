@@ -10,6 +10,7 @@
 #include "files/cell_file.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
+#include "study/diagnose_paper.hpp"
 #include "study/study.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
@@ -21,8 +22,9 @@ namespace {
 struct StudyOptions {
   std::string cell = "table9";  ///< OCV, capacity, and the initial values of the fits
   std::string recordings;       ///< folder with CSV files; empty: the simulated plant
-  unsigned long seed = 1;       ///< of the plant's noise
+  study::StudyOptions study;
   std::string out;              ///< folder: tables as CSV, study.json, study.html
+  bool diagnose_paper = false;  ///< instead of the study
   Output output;
 };
 
@@ -56,6 +58,11 @@ std::string csv_of(const files::PageTable& table) {
   return csv;
 }
 
+const char* verdict_of(const study::StudyClaim& c) {
+  if (!c.holds) return "not judged";
+  return *c.holds ? "yes" : "no";
+}
+
 std::string page_of_study(const study::StudyResult& r) {
   files::PageContent content{"Models, optimisers and experiments",
                              fmt::format("{} identifications of {}.", r.fits, r.source),
@@ -63,12 +70,21 @@ std::string page_of_study(const study::StudyResult& r) {
                              {},
                              r.charts};
   for (const measurement::Warning& w : r.warnings) content.warnings.push_back(w.text);
-  files::PageTable claims{
-      "claims", "Statements of the paper, and whether they hold here", {"statement", "holds", "observation"}, {}, ""};
+  files::PageTable claims{"claims",
+                          "Statements of the paper in the run that the tables below show",
+                          {"statement", "holds", "observation"},
+                          {},
+                          "One run proves little: see the shares over many cells."};
   for (const study::StudyClaim& c : r.claims)
-    claims.rows.push_back({{c.claim, {}, {}}, {c.holds ? "yes" : "no", {}, {}}, {c.result, {}, {}}});
+    claims.rows.push_back({{c.claim, {}, {}}, {verdict_of(c), {}, {}}, {c.result, {}, {}}});
+  const auto shares = [](const files::PageTable& t) { return t.id == "statements"; };
+  for (const files::PageTable& t : r.tables) {
+    if (shares(t)) content.tables.push_back(t);
+  }
   content.tables.push_back(std::move(claims));
-  content.tables.insert(content.tables.end(), r.tables.begin(), r.tables.end());
+  for (const files::PageTable& t : r.tables) {
+    if (!shares(t)) content.tables.push_back(t);
+  }
   return reports::page_of(content);
 }
 
@@ -104,8 +120,8 @@ std::vector<std::string> files_of_results(const StudyOptions& options) {
 
 study::StudyResult compute(const StudyOptions& options, const files::CellFile& cell,
                            const std::vector<std::string>& recordings) {
-  if (options.recordings.empty()) return study::study_plant(cell.parameters, options.seed, study_progress());
-  return study::study_recordings(cell.parameters, recordings, study_progress());
+  if (options.recordings.empty()) return study::study_plant(cell.parameters, options.study, study_progress());
+  return study::study_recordings(cell.parameters, recordings, options.study, study_progress());
 }
 
 void write(const StudyOptions& options, const std::vector<std::string>& recordings, const study::StudyResult& result) {
@@ -124,8 +140,29 @@ void write(const StudyOptions& options, const std::vector<std::string>& recordin
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
   for (const study::StudyClaim& c : result.claims)
-    text += fmt::format("  {} {}: {}\n", c.holds ? "yes" : "no ", c.claim, c.result);
+    text += fmt::format("  {:10} {}: {}\n", verdict_of(c), c.claim, c.result);
   print_summary(options.output, text + "Report: " + (folder / "study.html").string());
+}
+
+/// --diagnose-paper: result to JSON and, if asked for, a page and tables.
+void diagnose_paper(const StudyOptions& options, const files::CellFile& cell) {
+  const study::PaperDiagnosis found = study::diagnose_paper(cell.parameters);
+  const std::string json = reports::json_of(found);
+  const std::vector<files::PageTable> tables = study::tables_of(found);
+  const std::string page =
+      reports::page_of({"Which physics the published figures ask for", found.statement, {}, tables, {}});
+  if (!options.out.empty()) {
+    const std::filesystem::path folder = options.out;
+    for (const files::PageTable& table : tables) write_output((folder / (table.id + ".csv")).string(), csv_of(table));
+    write_output((folder / "paper.json").string(), json);
+    write_output((folder / "paper.html").string(), page);
+  }
+  if (!options.output.json.empty()) write_output(options.output.json, json);
+  if (!options.output.report.empty()) write_output(options.output.report, page);
+  std::string text = found.statement + "\n";
+  for (const study::PaperPhysics& p : found.physics)
+    text += fmt::format("  {:22} {:.4g} {} ({:.3g} to {:.3g})\n", p.id, p.value, p.unit, p.low, p.high);
+  print_summary(options.output, text);
 }
 
 class StudyCommand final : public Command {
@@ -137,23 +174,33 @@ class StudyCommand final : public Command {
     c.add_option("--recordings", o_.recordings, "folder with recordings; a simulated cell is used if not given")
         ->type_name("DIR");
     c.add_option("--cell", o_.cell, cell_help("OCV, capacity and initial values"))->capture_default_str();
-    c.add_option("--seed", o_.seed, "seed of the simulated cell's noise")->capture_default_str();
-    c.add_option("--out", o_.out, "folder for the tables (CSV, JSON) and the page")->required()->type_name("DIR");
+    c.add_option("--seed", o_.study.seed, "seed of the simulated cell's noise")->capture_default_str();
+    c.add_option("--seeds", o_.study.seeds, "cells of each kind for the shares; 0: one run only")
+        ->capture_default_str();
+    c.add_option("--out", o_.out, "folder for the tables (CSV, JSON) and the page")->type_name("DIR");
+    c.add_flag("--diagnose-paper", o_.diagnose_paper,
+               "find which physics the published figures of the paper ask for, instead of the study");
     add_output(c, o_.output);
     return &c;
   }
 
   int run() override {
     o_.output.set_own("");
+    if (o_.out.empty() && !o_.diagnose_paper)
+      throw files::BadInput("--out", 1, "missing, expected a folder for the tables and the page");
     const std::vector<std::string> recordings = recordings_of(o_);
     std::vector<std::string> inputs = recordings;
     inputs.push_back(o_.cell);
     o_.output.protect(inputs, files_of_results(o_));
     const files::CellFile cell = files::read_cell(o_.cell);
     std::error_code error;
-    std::filesystem::create_directories(o_.out, error);
+    if (!o_.out.empty()) std::filesystem::create_directories(o_.out, error);
     if (error) {
       throw files::BadInput(o_.out, 1, "cannot be created (" + error.message() + "), expected a folder to write to");
+    }
+    if (o_.diagnose_paper) {
+      diagnose_paper(o_, cell);
+      return 0;
     }
     write(o_, recordings, compute(o_, cell, recordings));
     return 0;

@@ -151,7 +151,7 @@ void identify_linear_cell(const IdentifyOptions& options, StartCell start, const
     result.warnings.push_back(
         {"first_recording_only", "a linear model is identified from one recording; only the first was used"});
   }
-  result.data = {data_set.data};
+  result.data = {found.data};
   validate(
       options, inputs.options,
       [&](const IdentificationData& d) {

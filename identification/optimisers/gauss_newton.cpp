@@ -15,7 +15,7 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int most_bisections = 10;  // if the step is still too long, J has lost rank
+constexpr int most_bisections = 25;  // MaxBisections of the toolbox
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
   const Eigen::BDCSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
@@ -53,20 +53,31 @@ bool move_down_gradient(Optimisation& run) {
   return move_along(run, step.cwiseMax(run.below()).cwiseMin(run.above())) <= most_bisections;
 }
 
+/// The tolerance of the toolbox, GnPinvConst = 1e4.
+double pseudo_inverse_tolerance(const Optimisation& run) {
+  constexpr double gn_pinv_const = 1e4;
+  return gn_pinv_const * static_cast<double>(std::max(run.rows(), run.size())) * std::numeric_limits<double>::epsilon();
+}
+
 }  // namespace
 
+bool move_undamped(Optimisation& run) {
+  return move_along(run, subspace_step(run, pseudo_inverse_tolerance(run))) <= most_bisections;
+}
+
 void search_gauss_newton(Optimisation& run) {
-  // the tolerance of the toolbox, GnPinvConst = 1e4
-  const double tolerance =
-      1e4 * static_cast<double>(std::max(run.rows(), run.size())) * std::numeric_limits<double>::epsilon();
   while (!run.finished()) {
-    if (move_along(run, subspace_step(run, tolerance)) > most_bisections && !move_down_gradient(run)) run.no_decrease();
+    if (!move_undamped(run) && !move_down_gradient(run)) run.no_decrease();
   }
 }
 
 void search_adaptive_gauss_newton(Optimisation& run) {
-  // The values of Wills & Ninness hold for the eigenvalues of J'J: start 1e-4, up by 2, down by 4. Here: their roots.
+  // The toolbox compares eigenvalues of J'J: start 1e-4 (InitialGnaTolerance), up by 2 (LMStep) when no smaller cost
+  // was found in fewer than five bisections, down by 4 when the first step already found one. Here: the roots of all
+  // three.
   constexpr double start = 1e-2, up = 1.4142135623730951, down = 2, smallest = 1e-12, largest = 0.5;
+  constexpr double up_in_vain = 8;  // after a line search without any smaller cost, which the toolbox would end with
+  constexpr int many_bisections = 5;
   double gamma = start;
   bool in_vain = false;  // the last line search failed in a larger subspace
   while (!run.finished()) {
@@ -74,13 +85,14 @@ void search_adaptive_gauss_newton(Optimisation& run) {
     const bool exhausted =
         -run.expected_change(step) <= run.stopping().cost * run.cost();  // no further decrease in this subspace
     if ((exhausted && (in_vain || gamma <= smallest)) || (in_vain && gamma >= largest)) {
-      if (!move_down_gradient(run)) run.no_decrease();
+      if (!move_down_gradient(run) && !move_undamped(run)) run.no_decrease();
       in_vain = false;
       continue;
     }
     const int bisections = exhausted ? 0 : move_along(run, step);
     in_vain = bisections > most_bisections;
-    gamma = bisections == 0 ? std::max(gamma / down, smallest) : std::min(gamma * (in_vain ? 8 : up), largest);
+    if (bisections == 0) gamma = std::max(gamma / down, smallest);
+    if (bisections >= many_bisections) gamma = std::min(gamma * (in_vain ? up_in_vain : up), largest);
   }
 }
 

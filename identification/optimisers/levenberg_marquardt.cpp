@@ -30,7 +30,8 @@ VectorXd damped_step(const MatrixXd& a, const VectorXd& b, const VectorXd& weigh
 
 void search_levenberg_marquardt(Optimisation& run) {
   constexpr double largest_damping = 1e30;  // relative to J'J: the step is zero
-  double damping = 1e-3, raise = 2;
+  constexpr double start = 1e-3;
+  double damping = start, raise = 2;
   while (!run.finished()) {
     const VectorXd step = step_within_bounds(run, [&](const MatrixXd& a, const VectorXd& b, const Indices& free) {
       return damped_step(a, b, run.column_norms()(free), damping);
@@ -46,7 +47,10 @@ void search_levenberg_marquardt(Optimisation& run) {
     } else {
       damping *= raise;
       raise *= 2;
-      if (!(damping < largest_damping) || x == run.x()) run.no_decrease();
+      if (damping < largest_damping && x != run.x()) continue;
+      if (!move_undamped(run)) run.no_decrease();
+      damping = start;
+      raise = 2;
     }
   }
 }

@@ -95,6 +95,11 @@ using Solve = std::function<Eigen::VectorXd(const Eigen::MatrixXd& a, const Eige
 /// again. The step is zero or decreases the cost.
 Eigen::VectorXd step_within_bounds(const Optimisation& run, const Solve& solve);
 
+/// One complete Gauss-Newton step, shortened until the cost decreases. It leads along the edge of a region where r is
+/// not defined (an unstable model), at which damped steps and steps in a small subspace end. Returns false if no length
+/// decreases the cost.
+bool move_undamped(Optimisation& run);
+
 /// Step in the subspace of the singular values above tolerance * largest, bisected until the cost decreases.
 void search_gauss_newton(Optimisation& run);
 

@@ -1,5 +1,6 @@
 // Draws the page from `report`: {title, statement, warnings, sections: [{title, note, table: {head, rows: [[{text,
-// paper}]]}} | {title, chart: {labels, rows, x, bands}}]}. x: title of the axis if it is not the time.
+// paper}]]}} | {title, chart: {labels, rows, x, bands, right}}]}. x: title of the axis if it is not the time. right:
+// labels on an axis of their own.
 (() => {
   'use strict';
   const {make, get, chart, warnings} = drawing;
@@ -19,15 +20,20 @@
       for (const row of section.table.rows) {
         const tr = table.insertRow();
         for (const cell of row) {
-          const td = make(tr, 'td', cell.text);
+          const td = make(tr, 'td', cell.text, /[a-z]{4}/.test(cell.text) ? 'words' : undefined);
           if (cell.paper !== undefined) make(td, 'span', ' paper ' + cell.paper, 'paper');
         }
       }
     } else {
       const legend = make(caption, 'span', '', 'legend');
       const div = make(box, 'div', undefined, 'chart tall');
-      const {labels, rows, x, bands} = section.chart;
-      window.charts.push(chart(div, labels, rows, legend, {x, customBars: bands, drawPoints: x !== undefined}));
+      const {labels, rows, x, bands, right} = section.chart;
+      const more = {x, customBars: bands, drawPoints: x !== undefined};
+      if (right) {
+        more.series = Object.fromEntries(right.map(label => [label, {axis: 'y2'}]));
+        more.axes = {y2: {axisLabelWidth: 58, pixelsPerLabel: 24, independentTicks: true, drawGrid: false}};
+      }
+      window.charts.push(chart(div, labels, rows, legend, more));
     }
     if (section.note) make(box, 'p', section.note, 'note');
   }

@@ -132,15 +132,27 @@ TEST(RestReading, PointsAreAppendixAOnASmoothCurve) {
   const PointReading& p = r.rests[0].points;
   const double v_rc = 6 * cell.r1_ohm;  // settled
   EXPECT_NEAR(p.a_v, cell.ocv_v - v_rc - 6 * cell.r0_ohm, 1e-6);
-  // b: the median of the first 1 % of the rest, 12 s: its middle, 6 s after the step
-  EXPECT_NEAR(p.b_v, cell.ocv_v - v_rc * std::exp(-6 / cell.tau_s), 0.0003);
+  EXPECT_NEAR(p.b_v, cell.ocv_v - v_rc * std::exp(-0.1 / cell.tau_s), 1e-6);  // the first sample after the step
   EXPECT_NEAR(p.c_v, cell.ocv_v, 1e-6);
-  EXPECT_NEAR(p.d_v, p.b_v + 0.632 * (p.c_v - p.b_v), 1e-4);
+  EXPECT_NEAR(p.d_v, p.b_v + 0.633 * (p.c_v - p.b_v), 1e-12);
+  EXPECT_NEAR(p.time_constant_s, cell.tau_s, 0.01 * cell.tau_s);
   EXPECT_NEAR(p.r0_ohm, (p.b_v - p.a_v) / 6, 1e-12);
   EXPECT_NEAR(p.r1_ohm, (p.c_v - p.b_v) / 6, 1e-12);
   EXPECT_NEAR(p.c1_f, p.time_constant_s / p.r1_ohm, 1e-9);
   EXPECT_NEAR(r.rests[0].time_s, 1'260, 1e-9);
   EXPECT_NEAR(r.rests[0].load_a, -6, 1e-9);
+}
+
+// The printed equations on samples of 1 s: R0 is too large by the first second of the relaxation, R1 too small by it.
+TEST(RestReading, PointsUseTheSamplesNextToTheStep) {
+  const Cell cell{.tau_s = 12, .slope_v = 0};
+  for (const double rest_s : {600.0, 3'600.0}) {
+    const RestReadings r = read_rests(recording(cell, {{0, 60}, {-6, 360}, {0, rest_s}}, {.step_s = 1, .noise_v = 0}));
+    ASSERT_EQ(r.rests.size(), 1U);
+    const double first_second = cell.r1_ohm * (1 - std::exp(-1 / cell.tau_s));
+    EXPECT_NEAR(r.rests[0].points.r0_ohm, cell.r0_ohm + first_second, 1e-6) << rest_s;
+    EXPECT_NEAR(r.rests[0].points.r1_ohm, cell.r1_ohm - first_second, 1e-6) << rest_s;
+  }
 }
 
 TEST(RestReading, TakesTheStepsInstantWithinASampleFromItsMeanCurrent) {

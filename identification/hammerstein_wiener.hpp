@@ -1,0 +1,78 @@
+// Hammerstein-Wiener model (paper, 3.2.3): a static curve on the current, the output error model, a static curve on its
+// output.
+//
+//   u = f(i) = i + direction s(i) + growth i s(i) / 1C      s(i) = sqrt(i^2 + (1C / 20)^2) - 1C / 20, a smooth |i|
+//   w = B/F u + offset                                      the output error model (discrete_model.hpp)
+//   y = g(w)                                                ten straight pieces with rounded corners
+//
+// g starts as the shape of the OCV over the state of charge that the data cover (section 2), stretched over the range
+// of w. Its two ends are fixed, because gain and offset are already unknowns of the linear block; nine corners are
+// unknown. Corners that the data do not reach stay where they are, by weak priors. The corners are rounded so that
+// every optimiser has derivatives.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "identification/discrete_model.hpp"
+#include "model/cell.hpp"
+
+namespace bms::identification {
+
+/// The curve on the current. All zero: f(i) = i.
+struct InputCurve {
+  double direction = 0;  ///< relative difference of charge and discharge, halved
+  double growth = 0;     ///< relative change of the gain at 1C
+  double one_c_a = 1;
+
+  double size(double current_a) const;  ///< s(i)
+  std::vector<double> through(std::span<const double> current_a) const;
+};
+
+/// The curve on the output: y at even steps of w, straight beyond its ends. Empty: y = w.
+struct OutputCurve {
+  double w_from_v = 0, w_step_v = 0;
+  std::vector<double> y_v;
+
+  double through(double w_v) const;
+  double slope(double w_v) const;
+  /// dy / d y_v[k] at this w.
+  double by_corner(double w_v, std::size_t k) const;
+};
+
+struct HammersteinWiener {
+  Structure structure;
+  DiscreteModel linear;
+  InputCurve input;
+  OutputCurve output;
+};
+
+Eigen::VectorXd simulate(const HammersteinWiener& model, std::span<const double> current_a);
+
+/// Unknowns: those of the linear block, direction, growth, inner corners of the output curve.
+Eigen::VectorXd to_unknowns(const HammersteinWiener& model);
+HammersteinWiener with_unknowns(HammersteinWiener model, const Eigen::VectorXd& unknowns);
+
+/// A model around an identified linear block: f(i) = i, g with the shape of the OCV around `soc`, the middle of the
+/// data. Its corners enclose the range of w over the data.
+HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const Structure& structure,
+                                           const model::OcvTable<double>& ocv, const Data& data, double soc);
+
+/// Simulation error, then the priors. Throws as simulation_error().
+LeastSquares simulation_error(const Data& data, const HammersteinWiener& start);
+
+/// Models from data with resampled residuals: the spread of what they simulate is the uncertainty of the model.
+/// Residuals are drawn in blocks as long as their correlation, and enlarged by the freedom that the fit takes. The same
+/// seed gives the same models.
+std::vector<HammersteinWiener> resampled(const HammersteinWiener& model, const Data& data, std::size_t count,
+                                         std::uint64_t seed);
+
+/// The simulation of a model and, sample by sample, limits that contain 95 %, from the spread of the resampled models.
+struct Band {
+  Eigen::VectorXd low_v, high_v;
+};
+Band band_of(const HammersteinWiener& model, const std::vector<HammersteinWiener>& resampled,
+             std::span<const double> current_a);
+
+}  // namespace bms::identification

@@ -1,0 +1,77 @@
+// Which physics the published figures of the paper ask for: a simulated cell with a few unknowns is fitted to Tables 5
+// to 8 and Appendix A at once, with and without each effect, and predicts figures that were not used.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "study/paper_figures.hpp"
+#include "study/study.hpp"
+
+namespace bms::study {
+
+/// Effects that a candidate may have.
+struct Effects {
+  bool hysteresis = false, slow_polarisation = false, other_ocv = false;
+  std::string name() const;
+};
+
+/// A number of the chosen candidate with its 95 % interval.
+struct PaperPhysics {
+  std::string id;
+  double value = 0, low = 0, high = 0;
+  std::string unit;
+};
+
+/// How well simulated figures agree with Table 7.
+struct Table7Match {
+  double rank_correlation = 0;               ///< of all 49 cells (Spearman)
+  double off_diagonal_rank_correlation = 0;  ///< of the 42
+  double median_gap_points = 0;
+};
+
+struct CandidateFit {
+  Effects effects;
+  std::size_t unknowns = 0;
+  double score = 0;   ///< smaller is better; it contains the penalty of Schwarz for the unknowns
+  double weight = 0;  ///< share among the candidates, exp(-score)
+  Table7Match table7;
+};
+
+/// Figures that were left out of a fit, predicted.
+struct HeldOut {
+  std::string table;  ///< "8"; or the half of Table 7
+  std::string from;   ///< what was fitted
+  std::optional<double>
+      rank_correlation;  ///< of Table 8 the mean over its columns; missing where there are few figures
+  std::optional<double> median_gap_points;  ///< of fits in percent
+  double typical_ratio = 0;                 ///< exp of the RMS of the logarithms
+};
+
+struct Contradiction {
+  std::string figure;
+  double published = 0, simulated = 0;
+};
+
+struct PaperDiagnosis {
+  std::vector<CandidateFit> candidates;  ///< best first
+  std::vector<PaperPhysics> physics;     ///< of the best
+  CandidateFit plain;                    ///< the equations of the paper alone
+  std::vector<HeldOut> held_out;
+  std::vector<HeldOut> held_out_plain;  ///< the same predictions by the equations of the paper alone
+  std::vector<Contradiction> contradictions;
+  std::vector<Figure> simulated;  ///< by the best candidate, in the order of published_figures()
+  std::string statement;          ///< for the reader
+  double seconds = 0;
+};
+
+PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell);
+
+/// Tables of the page.
+std::vector<files::PageTable> tables_of(const PaperDiagnosis& diagnosis);
+
+/// Spearman's rank correlation; ties get their mean rank.
+double rank_correlation(const std::vector<double>& a, const std::vector<double>& b);
+
+}  // namespace bms::study

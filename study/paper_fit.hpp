@@ -1,0 +1,52 @@
+// One candidate of the diagnosis of the paper, fitted to some of the published figures.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "study/diagnose_paper.hpp"
+
+namespace bms::study {
+
+/// An unknown of a candidate; the search is over its logarithm.
+struct PaperUnknown {
+  std::string id, unit;
+  double start = 0, low = 0, high = 0;
+  double LeftOut::*of_cell = nullptr;
+  double Bench::*of_bench = nullptr;
+};
+
+class PaperFit {
+ public:
+  PaperFit(const model::CellParameters<>& cell, const Effects& effects);
+
+  const std::vector<PaperUnknown>& unknowns() const { return unknowns_; }
+  Eigen::VectorXd start() const;
+  /// The best of a few points spread over the bounds.
+  Eigen::VectorXd screened(int points) const;
+  std::vector<Figure> simulate(const Eigen::VectorXd& x) const;
+
+  /// used: by figure, whether it counts.
+  Eigen::VectorXd fit(const Eigen::VectorXd& from, const std::vector<bool>& used, int iterations) const;
+
+  /// Standard deviations of the logarithms at x, from the derivatives and the weighted residuals of all figures.
+  Eigen::VectorXd deviation(const Eigen::VectorXd& x) const;
+
+  /// Sum over the groups of independent figures times the logarithm of their RMS difference, and the penalty.
+  double score(const std::vector<Figure>& simulated) const;
+
+  const std::vector<Figure>& published() const { return published_; }
+
+ private:
+  id::LeastSquares problem(const std::vector<bool>& used) const;
+  Eigen::VectorXd weighted(const std::vector<Figure>& simulated, const std::vector<bool>& used) const;
+
+  model::CellParameters<> cell_;
+  Effects effects_;
+  std::vector<Figure> published_;
+  std::vector<PaperUnknown> unknowns_;
+};
+
+}  // namespace bms::study

@@ -1,0 +1,210 @@
+// Hammerstein-Wiener on an exact system, in the arithmetic of the test: pole by pole, corner by corner.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "files/cell_file.hpp"
+#include "identification/linear_models.hpp"
+#include "identification/resample.hpp"
+
+namespace bms::identification {
+namespace {
+
+model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
+
+/// Straight pieces, without rounding: max() of lines is how a kink is made.
+double kinked(double w_v) {
+  return 3.0 + 0.6 * w_v + 0.5 * std::max(0.0, w_v - 0.10) - 0.7 * std::max(0.0, w_v - 0.22);
+}
+
+struct System {
+  double direction = 0.06;          ///< relative difference of charge and discharge, halved
+  double slow = 0.92, gain = 5e-3;  ///< pole, and ohm per sample
+  double per_as = 1.2e-5, direct_ohm = 0.012;
+};
+
+/// Voltage of the system under a current, without noise.
+std::vector<double> voltage_of(const System& s, const std::vector<double>& current_a) {
+  std::vector<double> v;
+  double relaxing = 0, counted = 0.15, before_a = 0;
+  for (const double now_a : current_a) {
+    const double i = before_a;  // the output error model has a delay of one sample
+    before_a = now_a;
+    const double u = i + s.direction * (std::hypot(i, 0.3) - 0.3);
+    relaxing = s.slow * relaxing + s.gain * (1 - s.slow) * u;
+    counted += s.per_as * u;
+    v.push_back(kinked(counted + s.direct_ohm * u + relaxing));
+  }
+  return v;
+}
+
+/// Pulses of random size and length, with as much charge as discharge.
+Data pulses(std::uint64_t seed, std::size_t count) {
+  std::mt19937_64 random(seed);
+  Data data;
+  data.capacity_ah = 6;
+  double current_a = 0;
+  std::size_t left = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    if (left-- == 0) {
+      left = 5 + random() % 60;
+      current_a = -6 + 12 * static_cast<double>(random() % 1'000) / 1'000;
+    }
+    data.time_s.edit().push_back(static_cast<double>(k));
+    data.current_a.edit().push_back(current_a);
+  }
+  data.voltage_v = voltage_of({}, data.current_a.copy());
+  return data;
+}
+
+Data with_noise(Data data, std::uint64_t seed, double noise_v) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (double& v : data.voltage_v.edit()) v += noise_v * normal(random);
+  return data;
+}
+
+LinearIdentification identified(const Data& data, Method method) {
+  return identify_linear(LinearKind::hammerstein_wiener, table9(), data, 0.5, method);
+}
+
+// The corners of the model do not lie at the kinks of the system, so several minima lie close together.
+TEST(HammersteinWiener, NoFastOptimiserStopsAtAKink) {
+  const Data data = with_noise(pulses(1, 1'000), 2, 0.0005);
+  double best = 0;
+  std::array<double, 4> fits{};
+  constexpr std::array fast = {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton,
+                               Method::levenberg_marquardt, Method::trust_region_reflective};
+  std::array<std::string, 4> ends;
+  for (std::size_t k = 0; k < fast.size(); ++k) {
+    const Identification found = identified(data, fast[k]).identification;
+    fits[k] = found.estimation.fit_percent;
+    ends[k] = std::to_string(found.optimum.iterations) + " iterations: " + found.optimum.reason;
+    best = std::max(best, fits[k]);
+  }
+  EXPECT_GT(best, 97);
+  for (std::size_t k = 0; k < fast.size(); ++k) EXPECT_GT(fits[k], best - 0.5) << name_of(fast[k]) << ", " << ends[k];
+  // steepest descent goes as far as it comes
+  EXPECT_LE(identified(data, Method::steepest_descent).identification.estimation.fit_percent, best + 0.1);
+}
+
+TEST(HammersteinWiener, FindsTheDirectionOfTheInputCurve) {
+  const Data data = with_noise(pulses(3, 1'000), 4, 0.0005);
+  const LinearIdentification found = identified(data, Method::trust_region_reflective);
+  EXPECT_NEAR(found.model.blocks.input.direction, System{}.direction, 0.02);
+}
+
+TEST(HammersteinWiener, DerivativesAreThoseOfTheResiduals) {
+  const Data data = pulses(5, 200);
+  HammersteinWiener start =
+      begin_hammerstein_wiener(start_values(data, output_error()), output_error(), table9().ocv, data, 0.5);
+  const LeastSquares problem = simulation_error(data, start);
+  const Eigen::VectorXd x = to_unknowns(start);
+  Eigen::VectorXd r, above, below;
+  Eigen::MatrixXd jacobian;
+  ASSERT_TRUE(problem.evaluate(x, r, &jacobian));
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double h = 1e-6 * problem.scale[k];
+    Eigen::VectorXd moved = x;
+    moved[k] = x[k] + h;
+    ASSERT_TRUE(problem.evaluate(moved, above, nullptr));
+    moved[k] = x[k] - h;
+    ASSERT_TRUE(problem.evaluate(moved, below, nullptr));
+    const Eigen::VectorXd difference = (above - below) / (2 * h);
+    EXPECT_LT((difference - jacobian.col(k)).norm(), 2e-3 * (1e-6 + difference.norm())) << k;
+  }
+}
+
+void perturb(HammersteinWiener& m) {
+  m.input.direction = 0.05;
+  m.input.growth = -0.04;
+  for (std::size_t k = 1; k + 1 < m.output.y_v.size(); ++k) m.output.y_v[k] += k % 2 == 0 ? 0.004 : -0.003;
+}
+
+/// A system of the model's own class, around the linear block of a circuit.
+HammersteinWiener exact_system(const Data& data) {
+  const DiscreteCoefficients c = discrete_from_circuit({0.3, 0.012, 0.010, 1'500}, 1, 3'600 * data.capacity_ah);
+  const DiscreteModel linear{{c.c0, c.c1, c.c2}, {c.a1, c.a2}, 1, 3.2, {0, 0}};
+  HammersteinWiener m = begin_hammerstein_wiener(linear, output_error(), table9().ocv, data, 0.5);
+  perturb(m);
+  return m;
+}
+
+TEST(HammersteinWiener, EveryFastOptimiserFindsAnExactSystem) {
+  Data data = pulses(9, 1'000);
+  const Eigen::VectorXd truth = simulate(exact_system(data), data.current_a);
+  data.voltage_v = std::vector<double>(truth.begin(), truth.end());
+  data = with_noise(data, 1, 0.0005);
+  double least = 100, most = 0;
+  std::string ends;
+  for (const Method method : {Method::subspace_gauss_newton, Method::adaptive_subspace_gauss_newton,
+                              Method::levenberg_marquardt, Method::trust_region_reflective}) {
+    const Identification found = identified(data, method).identification;
+    least = std::min(least, found.estimation.fit_percent);
+    most = std::max(most, found.estimation.fit_percent);
+    ends += std::string(name_of(method)) + " " + std::to_string(found.estimation.fit_percent) + " after " +
+            std::to_string(found.optimum.iterations) + " iterations: " + found.optimum.reason + "\n";
+  }
+  EXPECT_GT(most, 98);
+  EXPECT_GT(least, most - 0.1) << ends;
+}
+
+// The truth is the voltage of an exact system without noise.
+TEST(HammersteinWiener, BandsFromResamplingContainTheTruth) {
+  constexpr std::size_t trials = 10, models = 30, count = 500;
+  Data truth = pulses(7, count);
+  // a system whose corners lie where those of the model will lie
+  HammersteinWiener system = identified(truth, Method::trust_region_reflective).model.blocks;
+  perturb(system);
+  const Eigen::VectorXd v = simulate(system, truth.current_a);
+  truth.voltage_v = std::vector<double>(v.begin(), v.end());
+  std::size_t inside = 0, all = 0;
+  std::string by_trial;
+  for (std::uint64_t trial = 0; trial < trials; ++trial) {
+    const Data data = with_noise(truth, 10 + trial, 0.001);
+    const LinearIdentification found = identified(data, Method::trust_region_reflective);
+    const Band band = band_of(found.model.blocks, resampled(found.model.blocks, data, models, trial), data.current_a);
+    for (Eigen::Index k = 0; k < band.low_v.size(); ++k) {
+      inside += v[k] >= band.low_v[k] && v[k] <= band.high_v[k] ? 1U : 0U;
+      ++all;
+    }
+    by_trial += std::to_string(static_cast<double>(inside) / static_cast<double>(all)) + " " +
+                std::to_string(1e3 * found.identification.estimation.rmse_v) + " mV\n";
+  }
+  const double coverage = static_cast<double>(inside) / static_cast<double>(all);
+  EXPECT_GT(coverage, 0.90) << by_trial;
+  EXPECT_LT(coverage, 0.99);
+}
+
+TEST(Resample, KeepsChargeAndMarksGaps) {
+  Data data;
+  data.capacity_ah = 6;
+  double t = 0, charge_as = 0;
+  for (int k = 0; k < 300; ++k) {
+    const double usual_s = k % 3 == 0 ? 1.3 : 1;
+    const double step_s = k == 150 ? 40 : usual_s;
+    t += k == 0 ? 0 : step_s;
+    const double current_a = 2 * std::sin(0.05 * t);
+    if (k > 0) charge_as += current_a * step_s;
+    data.time_s.edit().push_back(t);
+    data.current_a.edit().push_back(current_a);
+    data.voltage_v.edit().push_back(3.2 + 0.001 * t);
+  }
+  const EvenData even = evenly_sampled(data);
+  EXPECT_TRUE(even.resampled);
+  EXPECT_EQ(even.step_s, 1);
+  EXPECT_NEAR(static_cast<double>(even.gap_samples), 39, 1);
+  double resampled_as = 0;
+  for (std::size_t k = 1; k < even.data.size(); ++k) {
+    resampled_as += even.data.current_a[k] * even.step_s;
+    if (!std::isfinite(even.data.voltage_v[k])) continue;
+    EXPECT_NEAR(even.data.voltage_v[k], 3.2 + 0.001 * even.data.time_s[k], 1e-9) << k;
+  }
+  EXPECT_NEAR(resampled_as, charge_as, 2);  // the last part of a step is left out
+  EXPECT_FALSE(evenly_sampled(pulses(1, 50)).resampled);
+}
+
+}  // namespace
+}  // namespace bms::identification
