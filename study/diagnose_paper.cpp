@@ -78,7 +78,7 @@ struct Split {
 std::vector<Split> splits_of(const std::vector<Figure>& published) {
   std::vector<Split> all;
   for (std::size_t g = 0; g < figure_group_names.size(); ++g) {
-    Split one{figure_group_names[g], "all others", {}};
+    Split one{figure_group_names[g], "all other tables", {}};
     for (const Figure& f : published) one.used.push_back(static_cast<std::size_t>(f.group) != g);
     all.push_back(std::move(one));
   }
@@ -173,6 +173,11 @@ std::string statement_of(const PaperDiagnosis& d) {
       best.effects.name(), best.table7.rank_correlation, best.table7.median_gap_points, d.plain.table7.rank_correlation,
       d.plain.table7.median_gap_points);
   if (!reached) text += " Part of the pattern remains unexplained.";
+  for (std::size_t k = 0; k < d.held_out.size() && k < d.held_out_plain.size(); ++k) {
+    if (d.held_out[k].table != figure_group_names.front()) continue;
+    if (d.held_out[k].rank_correlation > d.held_out_plain[k].rank_correlation) continue;
+    text += fmt::format(" From {}, it predicts Table 7 no better than these equations.", d.held_out[k].from);
+  }
   return text;
 }
 
