@@ -4,13 +4,16 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "reports/diagnosis_page.hpp"
 #include "reports/json_results.hpp"
+#include "reports/pack_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "workflow/diagnose_recordings.hpp"
+#include "workflow/pack_diagnosis.hpp"
 
 namespace bms::tool {
 
@@ -76,6 +79,27 @@ std::string summary(const workflow::DiagnoseResult& r) {
   return text;
 }
 
+/// The findings of a pack, a few lines each.
+std::string pack_summary(const workflow::PackResult& r) {
+  namespace dp = diagnosis::pack;
+  std::string text = fmt::format("{}: ", name_of(r.diagnosis.verdict));
+  if (r.diagnosis.findings.empty()) text += r.diagnosis.statement;
+  for (const dp::PackFinding& f : r.diagnosis.findings) {
+    text += "\n" + dp::sentence_of(f) + "\n";
+    if (f.cause != dp::Cause::shared && !f.because.empty()) text += "  " + f.because + "\n";
+    if (!f.rivals.empty()) text += "  " + dp::rivals_text(f) + "\n";
+    if (f.after_s) text += "  " + dp::time_text(f) + "\n";
+    if (const std::string_view action = dp::text_of(f.cause).action; !action.empty())
+      text += fmt::format("  {}\n", action);
+  }
+  if (text.back() != '\n') text += '\n';
+  if (!r.diagnosis.findings.empty() && !r.diagnosis.unexplained.empty()) text += r.diagnosis.statement + '\n';
+  std::string limits;
+  for (const dp::PackLimit& l : r.diagnosis.detection_limits)
+    limits += (limits.empty() ? "" : ", ") + dp::limit_text(l);
+  return text + "All cells together: " + r.shared + "\nSmallest sizes that would be named: " + limits + ".";
+}
+
 class DiagnoseCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
@@ -86,7 +110,13 @@ class DiagnoseCommand final : public Command {
     c.footer(
         "Example: bms diagnose --cell my_cell.toml --recording monday.csv --holdout tuesday.csv --initial-soc 0.95 "
         "--out extended.toml --report monday.html");
-    c.add_option("--cell", o_.cell, cell_help("the calibrated cell"))->required();
+    CLI::Option_group& which = *c.add_option_group("cell or pack");
+    which.add_option("--cell", o_.cell, cell_help("the calibrated cell"));
+    which.add_option(
+        "--pack", pack_,
+        "the calibrated cell of a pack in series, as --cell: compares the cells v_1 to v_N of one recording "
+        "with each other and names the cell, channel, connection or sensor that is at fault");
+    which.require_option(1);
     c.add_option("--recording", o_.recordings, "recordings to diagnose, the earliest first")
         ->required()
         ->type_name("FILE");
@@ -108,7 +138,30 @@ class DiagnoseCommand final : public Command {
     return &c;
   }
 
-  int run() override {
+  int run() override { return pack_.empty() ? run_cell() : run_pack(); }
+
+ private:
+  int run_pack() {
+    if (o_.recordings.size() != 1 || !o_.holdouts.empty() || !out_.empty() || o_.initial_soc.size() > 1)
+      throw files::BadInput("--pack", 1, "one recording with at most one --initial-soc, without --holdout and --out");
+    output_.protect({pack_, o_.recordings.front()});
+    complete_reading(o_.reading);
+    workflow::PackOptions options;
+    options.reading = o_.reading;
+    options.cell = pack_;
+    options.recording = o_.recordings.front();
+    if (!o_.initial_soc.empty()) options.initial_soc = o_.initial_soc.front();
+    options.progress = progress_on_terminal(0.1, progress_line);
+    const workflow::PackResult result = workflow::diagnose_pack(options);
+    print_read_as(output_, result.recording);
+    for (const measurement::Warning& w : result.warnings) warn(w.text);
+    if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
+    if (!output_.report.empty()) write_output(output_.report, reports::pack_report(result));
+    print_summary(output_, pack_summary(result));
+    return 0;
+  }
+
+  int run_cell() {
     output_.set_own(out_);
     std::vector<std::string> inputs = {o_.cell};
     inputs.insert(inputs.end(), o_.recordings.begin(), o_.recordings.end());
@@ -138,9 +191,8 @@ class DiagnoseCommand final : public Command {
     return 0;
   }
 
- private:
   workflow::DiagnoseOptions o_;
-  std::string out_;
+  std::string out_, pack_;
   double false_alarm_rate_ = 0.01;
   Output output_;
 };

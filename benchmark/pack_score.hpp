@@ -1,0 +1,41 @@
+// How often the diagnosis of a pack names the planted cell and cause.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "benchmark/truth/packs.hpp"
+#include "diagnosis/pack/pack_verdict.hpp"
+
+namespace bms::benchmark {
+
+/// One planted fault: what became of it.
+struct PlantedOutcome {
+  truth::PackFault fault;
+  bool named = false;       ///< cell and cause right, as the first answer
+  bool listed = false;      ///< the right one is among what else it could be, or first
+  bool cell_right = false;  ///< the cell, with any cause
+  double found = 0;         ///< size, if named
+  double pull = 0;          ///< (size - truth) / sigma, if named
+  double after_s = 0;       ///< time to name; 0: unknown
+};
+
+struct PackOutcome {
+  std::string name;
+  bool healthy = false;
+  double hours = 0, wall_s = 0;
+  std::size_t cells = 0;
+  std::string verdict, statement;
+  std::vector<PlantedOutcome> planted;
+  std::vector<std::string> wrong;  ///< what was named and was not planted
+};
+
+PackOutcome score_pack(const truth::PackCase& c, const diagnosis::pack::PackDiagnosis& d);
+
+/// The table of a run, as Markdown.
+std::string pack_table(const std::vector<PackOutcome>& outcomes);
+/// Every outcome as JSON.
+std::string pack_json(const std::vector<PackOutcome>& outcomes);
+
+}  // namespace bms::benchmark

@@ -1,0 +1,129 @@
+// Diagnoses simulated packs (truth/packs.hpp) and scores the answers.
+//
+//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--json FILE] [--readme FILE] [--write FOLDER]
+#include <atomic>
+#include <filesystem>
+#include <mutex>
+#include <thread>
+
+#include <fmt/format.h>
+#include <CLI/CLI.hpp>
+
+#include "benchmark/pack_score.hpp"
+#include "benchmark/truth/case_files.hpp"
+#include "benchmark/truth/packs.hpp"
+#include "files/bad_input.hpp"
+#include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
+#include "files/text_file.hpp"
+#include "workflow/pack_diagnosis.hpp"
+
+namespace {
+
+namespace truth = bms::benchmark::truth;
+using bms::benchmark::PackOutcome;
+
+struct Options {
+  std::uint64_t seed = 1;
+  std::size_t faulty = 60, healthy = 60, first = 0;
+  unsigned jobs = 1;
+  bool no_shared = false;
+  std::string json, readme, write;
+};
+
+bms::measurement::Recording recording_of(const truth::PackSeries& s) {
+  bms::measurement::Recording r;
+  r.time_s = s.time_s;
+  r.current_a = s.current_a;
+  for (const auto& v : s.cell_v) r.cell_voltage_v.emplace_back(v);
+  for (const auto& t : s.sensor_c) r.cell_temperature_c.emplace_back(t);
+  if (!s.pack_v.empty()) r.pack_voltage_v = s.pack_v;
+  return r;
+}
+
+PackOutcome run_pack(const truth::PackCase& c, bool shared) {
+  bms::workflow::PackOptions options;
+  options.shared = shared;
+  options.initial_soc = c.given_initial_soc;
+  const auto cell = bms::files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
+  const bms::workflow::PackResult r = bms::workflow::diagnose_pack(cell, recording_of(c.recording), options);
+  PackOutcome o = bms::benchmark::score_pack(c, r.diagnosis);
+  o.wall_s = r.wall_s;
+  return o;
+}
+
+const char* word_for(const bms::benchmark::PlantedOutcome& p) {
+  if (p.named) return "right ";
+  return p.listed ? "listed" : "missed";
+}
+
+void print(const PackOutcome& o) {
+  fmt::print("{} ({} cells, {:.0f} h, {:.0f} s): {}\n", o.name, o.cells, o.hours, o.wall_s, o.verdict);
+  for (const auto& p : o.planted)
+    fmt::print("  {} {} {} {:.4g}{}\n", word_for(p), p.fault.id,
+               p.fault.cell ? fmt::format("{}", *p.fault.cell + 1) : "-", p.fault.size,
+               p.named ? fmt::format(", found {:.4g}, {:+.1f} sigma", p.found, p.pull) : "");
+  for (const std::string& text : o.wrong) fmt::print("  wrong {}\n", text);
+  std::fflush(stdout);
+}
+
+void write_case(const std::filesystem::path& folder, std::size_t k, const truth::PackCase& c) {
+  const std::string name = fmt::format("{}_{}", c.name.ends_with("healthy") ? "healthy" : "pack", k + 1);
+  bms::files::write_file((folder / (name + ".csv")).string(), truth::csv_of(c.recording));
+  bms::files::write_file((folder / (name + ".toml")).string(), truth::cell_toml(c.cell, name));
+}
+
+void run(const Options& o) {
+  const std::size_t count = o.faulty + o.healthy;
+  std::vector<PackOutcome> outcomes(count);
+  std::atomic<std::size_t> next = 0;
+  std::mutex printing;
+  const auto work = [&] {
+    for (std::size_t k = next++; k < count; k = next++) {
+      const bool healthy = k >= o.faulty;
+      const std::size_t index = o.first + (healthy ? k - o.faulty : k);
+      const truth::PackCase c = truth::make_pack(o.seed, index, healthy);
+      if (!o.write.empty()) write_case(o.write, index, c);
+      outcomes[k] = run_pack(c, !o.no_shared);
+      const std::scoped_lock lock(printing);
+      print(outcomes[k]);
+    }
+  };
+  std::vector<std::thread> threads;
+  for (unsigned k = 0; k < o.jobs; ++k) threads.emplace_back(work);
+  for (std::thread& t : threads) t.join();
+  const std::string table = fmt::format("Seed {}.\n\n", o.seed) + bms::benchmark::pack_table(outcomes);
+  fmt::print("\n{}", table);
+  if (!o.json.empty()) bms::files::write_file(o.json, bms::benchmark::pack_json(outcomes));
+  if (!o.readme.empty()) bms::files::replace_figures(o.readme, "packs", table);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Diagnoses simulated packs with planted faults, and healthy ones, and scores the answers"};
+  app.name("packs");
+  app.footer("Example: packs 1 --faulty 60 --healthy 60 --json packs.json");
+  Options o;
+  app.add_option("seed", o.seed, "seed of the packs")->required()->type_name("SEED");
+  app.add_option("--faulty", o.faulty, "packs with one to three faults")->capture_default_str();
+  app.add_option("--healthy", o.healthy, "packs without")->capture_default_str();
+  app.add_option("--first", o.first, "index of the first pack")->capture_default_str();
+  app.add_option("--jobs", o.jobs, "packs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
+  app.add_flag("--no-shared", o.no_shared, "do not diagnose the mean of the cells: faster");
+  app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
+  app.add_option("--readme", o.readme, "write the table between '<!-- figures: packs -->' and its end")
+      ->type_name("FILE");
+  app.add_option("--write", o.write, "write recordings and cell files to FOLDER")->type_name("FOLDER");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(o);
+    return 0;
+  } catch (const bms::files::BadInput& error) {
+    fmt::print(stderr, "{}\n", error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "packs: {}\n", error.what());
+    return 3;
+  }
+}

@@ -1,0 +1,275 @@
+#include "diagnosis/pack/cell_fit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+#include "diagnosis/pack/pack_thresholds.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+/// The neighbours' voltage at another time than that of a row, with straight lines between the rows.
+class Delayed {
+ public:
+  Delayed(const std::vector<double>& time_s, const std::vector<double>& v, double delay_s)
+      : time_s_(time_s), v_(v), delay_s_(delay_s) {}
+
+  struct Value {
+    double v, slope_v_per_s, share_of_step;  ///< share: where between two rows, 0 .. 1
+    double step_v;                           ///< between these rows
+    std::size_t row;                         ///< the nearer one of them
+  };
+  /// Rows in ascending order.
+  Value at(std::size_t row) {
+    const double wanted_s = time_s_[row] - delay_s_;
+    while (before_ + 2 < v_.size() && time_s_[before_ + 1] < wanted_s) ++before_;
+    const double width_s = time_s_[before_ + 1] - time_s_[before_];
+    if (!(width_s > 0)) return {v_[before_], 0, 0, 0, before_};
+    const double share = std::clamp((wanted_s - time_s_[before_]) / width_s, 0.0, 1.0);
+    const double step_v = v_[before_ + 1] - v_[before_];
+    return {v_[before_] + share * step_v, step_v / width_s, share, step_v, share > 0.5 ? before_ + 1 : before_};
+  }
+
+ private:
+  const std::vector<double>&time_s_, &v_;
+  double delay_s_;
+  std::size_t before_ = 0;
+};
+
+/// Columns of the parameters and, last, the difference that theta does not explain.
+struct Linearised {
+  Columns columns;
+  RowNoise noise;
+  std::vector<char> usable;
+  std::vector<double> difference_v;
+
+  explicit Linearised(std::size_t rows)
+      : columns(Columns::Zero(static_cast<Eigen::Index>(rows), parameter_count + 1)),
+        noise(rows),
+        usable(rows, 0),
+        difference_v(rows, no_value) {}
+};
+
+double change_of_soc(const Track& t, const Vector& theta, std::size_t k) {
+  return std::clamp(theta[charge] + theta[capacity] * (t.soc[k] - t.soc.front()) - theta[leak] * t.days[k],
+                    -limits.fit.most_soc_step, limits.fit.most_soc_step);
+}
+
+/// Additional noise of a row: the error of resistances at a step of the current, of the curve where it is steep, of the
+/// moment of sampling.
+void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di, double slope_v, double dz,
+                   const Delayed::Value& delayed, double edge, RowNoise& noise) {
+  constexpr const PackThresholds::Noise& n = limits.noise;
+  const auto square = [](double x) { return x * x; };
+  const double added_share = std::abs(theta[resistance]) + std::abs(theta[joint]) / t.r0_ohm;
+  noise.edge_v2[k] = square((n.edge_share + n.shape_share * added_share) * t.r0_ohm * di);
+  const double independent = -std::expm1(-square(dz / n.ocv_reach));
+  noise.slow_v2[k] = square(n.ocv_axis * slope_v) + 2 * square(t.ocv_tolerance_v) * independent;
+  // a step of the voltage lies before or after the moment of sampling, not in between; the whitener multiplies by
+  // edge^2
+  noise.white_v2[k] = delayed.share_of_step * (1 - delayed.share_of_step) * square(delayed.step_v / edge);
+}
+
+Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
+  const PackRecording& pack = *input.pack;
+  const Track& t = *input.track;
+  const std::vector<double>& v = pack.cell_v[input.cell];
+  Linearised out(pack.rows());
+  Delayed delayed(pack.time_s, t.neighbours_v, theta[delay]);
+  std::uint8_t here = 0, there = 0;
+  double last_a = 0;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    const Delayed::Value late = delayed.at(k);
+    const double current_a = t.instant_a[late.row], neighbours_v = t.neighbours_v[k];
+    const double di = pack.current_a[k] - last_a;
+    if (std::isfinite(pack.current_a[k])) last_a = pack.current_a[k];
+    const double difference_v = v[k] - neighbours_v;
+    if (!std::isfinite(difference_v + current_a + late.v + di)) continue;
+    const std::size_t then = late.row;  // when the channel was sampled
+    const double dz = change_of_soc(t, theta, then);
+    const auto from = model::look_up(t.cell, t.soc[then], here), to = model::look_up(t.cell, t.soc[then] + dz, there);
+    const double slope_v = to.ocv_delta_v * to.per_width,
+                 by_soc_v = slope_v + to.r0_delta_ohm * to.per_width * current_a;
+    // what the neighbours lose, measured: closer to the truth than the tables
+    const double all_v = late.v - from.ocv_v;
+    const double warmer_k = input.warmer_k.empty() || !std::isfinite(input.warmer_k[k]) ? 0 : input.warmer_k[k];
+    auto row = out.columns.row(static_cast<Eigen::Index>(k));
+    row[charge] = by_soc_v;
+    row[capacity] = by_soc_v * (t.soc[then] - t.soc.front());
+    row[leak] = -by_soc_v * t.days[then];
+    row[resistance] = all_v;
+    row[polarisation] = t.v_rc_v[then];
+    row[joint] = current_a;
+    row[offset] = 1;
+    row[gain] = late.v;
+    row[slope] = late.v - t.mean_v;
+    row[delay] = -late.slope_v_per_s;
+    row[temperature] = warmer_k * all_v;
+    double shape_v = 0;
+    for (const Parameter p : {shape_1, shape_2, shape_3}) {
+      row[p] = std::cos(std::numbers::pi * static_cast<double>(p - shape_1 + 1) * (t.soc[then] + dz));
+      shape_v += theta[p] * row[p];
+    }
+    const double explained_v = to.ocv_v - from.ocv_v + (to.r0_ohm - from.r0_ohm) * current_a +
+                               (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then] + theta[resistance] * all_v +
+                               theta[polarisation] * t.v_rc_v[then] + theta[joint] * current_a + theta[offset] +
+                               theta[gain] * late.v + theta[slope] * row[slope] + late.v - neighbours_v +
+                               theta[temperature] * warmer_k * all_v + shape_v;
+    row[parameter_count] = difference_v - explained_v;
+    out.difference_v[k] = difference_v;
+    out.usable[k] = 1;
+    add_row_noise(t, theta, k, di, slope_v, dz, late, edge, out.noise);
+  }
+  return out;
+}
+
+/// Sums of products up to each checkpoint, for the data with what theta explains added again.
+void add_information(const FitInput& input, const Linearised& l, CellFit& fit) {
+  const auto rows = static_cast<Eigen::Index>(input.pack->rows());
+  const Eigen::Index checkpoints = static_cast<Eigen::Index>(limits.checkpoints);
+  Information sum;
+  Eigen::Index from = 0;
+  fit.until.clear();
+  for (Eigen::Index c = 1; c <= checkpoints; ++c) {
+    const Eigen::Index to = rows * c / checkpoints;
+    if (to == from) continue;
+    const auto block = l.columns.middleRows(from, to - from);
+    const auto columns = block.leftCols<parameter_count>();
+    const Matrix products = columns.transpose() * columns;
+    sum.of_parameters += products;
+    sum.with_data += columns.transpose() * block.col(parameter_count) + products * fit.theta;
+    sum.until_s = input.pack->time_s[static_cast<std::size_t>(to - 1)];
+    fit.until.push_back(sum);
+    from = to;
+  }
+  fit.square = l.columns.col(parameter_count).squaredNorm();
+}
+
+/// Linearised and whitened around theta; cost: -2 log posterior but for a constant.
+CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, const NoiseModel& noise) {
+  CellFit fit;
+  fit.theta = theta;
+  fit.noise = noise;
+  Linearised l = linearise(input, theta, noise.edge);
+  const Whitener whitener(noise, input.pack->time_s, l.noise, l.usable);
+  fit.difference_v = std::move(l.difference_v);
+  fit.residual_v.assign(input.pack->rows(), no_value);
+  for (std::size_t k = 0; k < fit.residual_v.size(); ++k) {
+    if (l.usable[k] != 0) fit.residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
+  }
+  whitener.whiten(l.columns);
+  fit.used = whitener.used();
+  add_information(input, l, fit);
+  fit.cost = fit.square + whitener.log_determinant() + (theta.array() / prior.array()).square().sum();
+  return fit;
+}
+
+Vector most_probable(const Information& data, const Vector& prior) {
+  Matrix normal = data.of_parameters;
+  normal.diagonal() += prior.array().square().inverse().matrix();
+  return normal.ldlt().solve(data.with_data);
+}
+
+}  // namespace
+
+Vector starting_point(const FitInput& input, double lag_s) {
+  constexpr const PackThresholds::Fit& f = limits.fit;
+  const PackRecording& pack = *input.pack;
+  const Track& t = *input.track;
+  const std::size_t every = std::max<std::size_t>(1, pack.rows() / f.starting_rows);
+  Vector best = Vector::Zero(), theta = Vector::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  for (double z = -f.most_charge; z <= f.most_charge + f.charge_step / 2; z += f.charge_step) {
+    for (double q = -f.most_capacity; q <= f.most_capacity + f.capacity_step / 2; q += f.capacity_step) {
+      theta[charge] = z;
+      theta[capacity] = q;
+      // best offset and resistance for this change of the state of charge
+      Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * std::numeric_limits<double>::epsilon();
+      Eigen::Vector2d right = Eigen::Vector2d::Zero();
+      double square = 0;
+      std::uint8_t here = 0, there = 0;
+      for (std::size_t k = every - 1; k < pack.rows(); k += every) {
+        const double difference_v = pack.cell_v[input.cell][k] - t.neighbours_v[k];
+        if (!std::isfinite(difference_v + pack.current_a[k])) continue;
+        const double to_v = model::look_up(t.cell, t.soc[k] + change_of_soc(t, theta, k), there).ocv_v;
+        const double y = difference_v - to_v + model::look_up(t.cell, t.soc[k], here).ocv_v;
+        const Eigen::Vector2d column(1, pack.current_a[k]);
+        normal += column * column.transpose();
+        right += y * column;
+        square += y * y;
+      }
+      const double rest = square - right.dot(normal.ldlt().solve(right));
+      const double prior = (z * z + q * q) * std::numeric_limits<double>::epsilon();
+      if (rest + prior >= least) continue;
+      least = rest + prior;
+      best = theta;
+    }
+  }
+  best[delay] = lag_s;
+  return best;
+}
+
+CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior, const NoiseModel& noise) {
+  CellFit fit = around(input, start, prior, noise);
+  for (int i = 0; i < limits.fit.iterations; ++i) {
+    const Vector step = most_probable(fit.all(), prior) - fit.theta;
+    const double before = fit.cost;
+    double share = 1;
+    bool better = false;
+    for (int h = 0; h <= limits.fit.halvings && !better; ++h, share /= 2) {
+      CellFit next = around(input, fit.theta + share * step, prior, noise);
+      better = next.cost < fit.cost;
+      if (better) fit = std::move(next);
+    }
+    if (!better || before - fit.cost < limits.fit.converged) break;
+  }
+  return fit;
+}
+
+NoiseModel noise_of(const FitInput& input, const CellFit& fit) {
+  constexpr const PackThresholds::Noise& n = limits.noise;
+  const Linearised l = linearise(input, fit.theta, 1);
+  const std::vector<double>& time_s = input.pack->time_s;
+  const auto cost_of = [&](const NoiseModel& noise) {
+    RowNoise rows = l.noise;
+    for (double& white_v2 : rows.white_v2) white_v2 /= noise.edge * noise.edge;
+    const Whitener whitener(noise, time_s, rows, l.usable);
+    std::vector<double> r(fit.residual_v);
+    for (double& v : r) v = std::isfinite(v) ? v : 0;
+    whitener.whiten(0, r);
+    double square = 0;
+    for (const double v : r) square += v * v;
+    return square + whitener.log_determinant();
+  };
+  NoiseModel best = fit.noise;
+  double cost = cost_of(best);
+  for (const double factor : n.factors) {
+    for (bool moved = true; moved;) {
+      moved = false;
+      for (double NoiseModel::*part :
+           {&NoiseModel::white_v, &NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::edge, &NoiseModel::slow_s}) {
+        for (const double by : {factor, 1 / factor}) {
+          NoiseModel tried = best;
+          tried.*part *= by;
+          const bool is_time = part == &NoiseModel::slow_s;
+          if (is_time && (tried.slow_s < 2 * tried.fast_s || tried.slow_s > time_s.back() - time_s.front())) continue;
+          if (!is_time && part != &NoiseModel::edge && (tried.*part < n.least_v || tried.*part > n.most_v)) continue;
+          const double tried_cost = cost_of(tried);
+          if (tried_cost >= cost - limits.fit.converged) continue;
+          cost = tried_cost;
+          best = tried;
+          moved = true;
+        }
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,213 @@
+#include "diagnosis/pack/channels.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
+#include "diagnosis/noise.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+constexpr const PackThresholds::Channels& of_channels = limits.channels;
+
+/// Voltage by which the model must move between two rows so that a reading of this channel must change.
+double moving_v(std::span<const double> readings, const Track& track, const PackRecording& pack) {
+  double step_v = 0;
+  if (std::any_of(readings.begin(), readings.end(), [](double v) { return std::isfinite(v); }))
+    step_v = quantisation_step(readings);
+  const double white_v = white_noise(readings, pack.current_a, limits.noise.quiet_c * track.capacity_ah, 0);
+  return std::max(of_channels.moving_at_least_v, of_channels.moving_steps * std::max(step_v, white_v));
+}
+
+/// Median time between changes of the reading, of stretches in which the model moves.
+double time_between_changes(const std::vector<double>& v, const Track& track, const PackRecording& pack,
+                            double most_v) {
+  std::vector<double> times;
+  std::size_t changed = 0;
+  double low = track.model_v[0], high = low;
+  for (std::size_t k = 1; k < v.size(); ++k) {
+    low = std::min(low, track.model_v[k]);
+    high = std::max(high, track.model_v[k]);
+    if (!std::isfinite(v[k]) || v[k] == v[changed]) continue;
+    if (high - low > most_v) times.push_back(pack.time_s[k] - pack.time_s[changed]);
+    changed = k;
+    low = high = track.model_v[k];
+  }
+  return times.empty() ? 0 : measurement::median(times);
+}
+
+/// Voltage over current at steps of the current between two rows.
+class ApparentResistance {
+ public:
+  void add(double dv, double di) {
+    if (!std::isfinite(dv)) return;
+    product_ += dv * di;
+    square_ += di * di;
+  }
+  double ohm() const { return square_ > 0 ? product_ / square_ : 0; }
+
+ private:
+  double product_ = 0, square_ = 0;
+};
+
+/// Counts moving rows, and those in which the reading did not change.
+ChannelState frozen_rows(const std::vector<double>& v, const Track& track, const PackRecording& pack, double most_v) {
+  ChannelState s;
+  ApparentResistance fresh, stale;
+  std::size_t frozen = 0, absent = 0, changed = 0;
+  for (std::size_t k = 0; k < v.size(); ++k) {
+    if (!std::isfinite(v[k])) ++absent;
+    if (k == 0 || !std::isfinite(v[k]) || !std::isfinite(v[k - 1])) continue;
+    const bool same = v[k] == v[k - 1];
+    if (std::abs(track.model_v[k] - track.model_v[k - 1]) > most_v) {
+      ++s.moving_rows;
+      if (same) ++frozen;
+    }
+    const double di = pack.current_a[k] - pack.current_a[k - 1], since = pack.current_a[k] - pack.current_a[changed];
+    const double step_a = of_channels.step_c * track.capacity_ah;
+    if (same && std::abs(di) > step_a) stale.add(v[k] - v[k - 1], di);
+    if (!same && std::abs(since) > step_a) fresh.add(v[k] - v[changed], since);
+    if (!same) changed = k;
+  }
+  s.missing_share = static_cast<double>(absent) / static_cast<double>(v.size());
+  if (s.moving_rows > 0) s.frozen_share = static_cast<double>(frozen) / static_cast<double>(s.moving_rows);
+  s.fresh_ohm = fresh.ohm();
+  s.stale_ohm = stale.ohm();
+  return s;
+}
+
+/// Squared difference of changes: readings against the model `lag` rows before, with the best factor.
+double error_at_lag(const std::vector<double>& v, const std::vector<double>& model, std::ptrdiff_t lag) {
+  double vv = 0, vm = 0, mm = 0;
+  const auto rows = static_cast<std::ptrdiff_t>(v.size());
+  for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, 1 + lag); k < std::min(rows, rows + lag); ++k) {
+    const auto at = static_cast<std::size_t>(k), from = static_cast<std::size_t>(k - lag);
+    const double dv = v[at] - v[at - 1], dm = model[from] - model[from - 1];
+    if (!std::isfinite(dv)) continue;
+    vv += dv * dv;
+    vm += dv * dm;
+    mm += dm * dm;
+  }
+  return mm > 0 && vv > 0 ? 1 - vm * std::max(vm, 0.0) / (vv * mm) : 1;
+}
+
+/// Lag of the readings behind the model, in whole rows.
+double best_lag(const std::vector<double>& v, const Track& track, double step_s) {
+  const auto rows_of = [&](double s) { return static_cast<std::ptrdiff_t>(s / step_s); };
+  const double now = error_at_lag(v, track.model_v, 0);
+  double best = now;
+  std::ptrdiff_t found = 0;
+  for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(of_channels.lag_to_s); ++lag) {
+    const double error = error_at_lag(v, track.model_v, lag);
+    if (error >= best) continue;
+    best = error;
+    found = lag;
+  }
+  return best < now - of_channels.lag_gain ? static_cast<double>(found) * step_s : 0;
+}
+
+void keep_fresh_readings(std::vector<double>& v) {
+  double last = no_value;
+  for (double& reading : v) {
+    const double now = reading;
+    if (!std::isfinite(last) || reading == last) reading = no_value;
+    if (std::isfinite(now)) last = now;
+  }
+}
+
+/// By row: how far the model moves in the rows around it.
+std::vector<double> movement_of(const Track& track) {
+  std::vector<double> movement;
+  const std::size_t rows = track.model_v.size(), reach = of_channels.moved_rows;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const auto first = track.model_v.begin() + static_cast<std::ptrdiff_t>(k > reach ? k - reach : 0),
+               last = track.model_v.begin() + static_cast<std::ptrdiff_t>(std::min(rows, k + reach + 1));
+    const auto [low, high] = std::minmax_element(first, last);
+    movement.push_back(*high - *low);
+  }
+  return movement;
+}
+
+/// Removes readings that differ from those around them by more than the pack moves, of a difference to the median cell.
+std::size_t remove_glitches(std::vector<double>& v, const std::vector<double>& median_v,
+                            const std::vector<double>& movement_v) {
+  std::vector<double> apart(v.size()), around;
+  for (std::size_t k = 0; k < v.size(); ++k) apart[k] = v[k] - median_v[k];
+  std::size_t count = 0;
+  double last_v = no_value;  // the common case is fast: nothing moved
+  for (std::size_t k = 0; k < v.size(); ++k) {
+    const double most_v = of_channels.glitch_v + 2 * movement_v[k];
+    if (!std::isfinite(apart[k]) || std::abs(apart[k] - last_v) < most_v / 2) continue;
+    const std::size_t first = k > of_channels.glitch_rows ? k - of_channels.glitch_rows : 0,
+                      end = std::min(v.size(), k + of_channels.glitch_rows + 1);
+    around.assign(apart.begin() + static_cast<std::ptrdiff_t>(first), apart.begin() + static_cast<std::ptrdiff_t>(end));
+    const double middle = measurement::median(around);
+    if (std::abs(apart[k] - middle) > most_v) {
+      v[k] = no_value;
+      ++count;
+    } else {
+      last_v = middle;
+    }
+  }
+  return count;
+}
+
+}  // namespace
+
+std::vector<std::size_t> Channels::repeated() const {
+  std::vector<std::size_t> list;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (cells[k].held_s) list.push_back(k);
+  }
+  return list;
+}
+
+std::vector<std::size_t> Channels::late(double step_s) const {
+  std::vector<double> lags;
+  for (const ChannelState& s : cells) lags.push_back(s.lag_s);
+  const double usual_s = measurement::median(lags);
+  std::vector<std::size_t> list;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    if (!cells[k].held_s && std::abs(cells[k].lag_s - usual_s) > step_s * of_channels.late_rows) list.push_back(k);
+  }
+  if (static_cast<double>(list.size()) > of_channels.grouped_share * static_cast<double>(cells.size())) list.clear();
+  return list;
+}
+
+Channels check_channels(const Track& track, PackRecording& pack) {
+  Channels channels;
+  ApparentResistance of_pack;
+  for (std::size_t k = 1; k < pack.rows() && !pack.pack_v.empty(); ++k) {
+    const double di = pack.current_a[k] - pack.current_a[k - 1];
+    if (std::abs(di) > of_channels.step_c * track.capacity_ah) of_pack.add(pack.pack_v[k] - pack.pack_v[k - 1], di);
+  }
+  if (!pack.pack_v.empty()) channels.pack_ohm = of_pack.ohm() / static_cast<double>(pack.cells());
+  std::vector<double> row, median_v;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    row.clear();
+    for (const auto& v : pack.cell_v) row.push_back(v[k]);
+    median_v.push_back(measurement::median(row));
+  }
+  const std::vector<double> movement_v = movement_of(track);
+  for (std::vector<double>& v : pack.cell_v) {
+    const std::size_t glitches = remove_glitches(v, median_v, movement_v);
+    const double most_v = moving_v(v, track, pack);
+    ChannelState s = frozen_rows(v, track, pack, most_v);
+    if (s.moving_rows >= of_channels.moving_rows && s.frozen_share > of_channels.held_share) {
+      s.held_s = time_between_changes(v, track, pack, most_v);
+      keep_fresh_readings(v);
+    } else {
+      s.lag_s = best_lag(v, track, track.step_s);
+    }
+    s.glitches = glitches;
+    channels.cells.push_back(s);
+  }
+  return channels;
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,340 @@
+#include "diagnosis/pack/diagnose_pack.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Cholesky>
+
+#include "diagnosis/pack/cell_fit.hpp"
+#include "diagnosis/pack/isolability.hpp"
+#include "diagnosis/pack/pack_likelihood.hpp"
+#include "diagnosis/pack/pack_texts.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/sensors.hpp"
+#include "diagnosis/pack/unexplained.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+/// The fits of all cells, and what they say of the pack.
+struct State {
+  const PackOptions& options;
+  PackRecording& pack;
+  Track track;
+  Channels channels;
+  std::vector<PackFinding> bad_sensors;
+  std::vector<CellFit> fits;
+  NoiseModel noise;
+  Vector healthy = Vector::Zero();
+  std::vector<Accusation> late;  ///< channels that lag by whole rows: certain
+  std::vector<Accusation> accused;
+
+  void progress(double share, const std::string& what) const {
+    if (options.progress) options.progress(share, what);
+  }
+};
+
+FitInput input_of(const State& s, std::size_t cell) {
+  return {.pack = &s.pack, .track = &s.track, .warmer_k = warmer_than_mean(s.pack, cell, s.bad_sensors), .cell = cell};
+}
+
+/// Standard deviations of the parameters of a cell if these accusations hold.
+Vector prior_of(const State& s, std::size_t cell, bool anything) {
+  const Vector fault = fault_spread(s.track.r0_ohm);
+  Vector prior = s.healthy;
+  const auto widen = [&](Eigen::Index p) { prior[p] = std::hypot(s.healthy[p], fault[p]); };
+  for (Eigen::Index p = 0; anything && p < prior.size(); ++p) widen(p);
+  for (const Accusation& a : s.accused) {
+    if (a.touches(cell)) widen(static_cast<Eigen::Index>(parameter_of(a.cause)));
+  }
+  return prior;
+}
+
+/// Own white noise of a channel, at least that of the typical one.
+NoiseModel noise_for(const State& s, std::size_t cell) {
+  NoiseModel noise = s.noise;
+  noise.white_v = std::max(noise.white_v, white_noise(s.fits[cell].difference_v, s.pack.current_a,
+                                                      limits.noise.quiet_c * s.track.capacity_ah, noise.white_v));
+  return noise;
+}
+
+void fit_all(State& s, bool anything, double from, double to) {
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    const double share = static_cast<double>(c) / static_cast<double>(s.fits.size());
+    s.progress(from + share * (to - from), "cells");
+    s.fits[c] = fit_cell(input_of(s, c), s.fits[c].theta, prior_of(s, c, anything), noise_for(s, c));
+  }
+}
+
+/// The noise of the cells that differ least from their neighbours: the median of each amplitude.
+void learn_noise(State& s) {
+  std::vector<std::size_t> order(s.fits.size());
+  for (std::size_t c = 0; c < order.size(); ++c) order[c] = c;
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return s.fits[a].square < s.fits[b].square; });
+  // neither the best nor the worst ones
+  const std::size_t count = std::min(limits.noise.cells, (order.size() + 1) / 2), first = order.size() / 2 - count / 2;
+  std::vector<NoiseModel> found;
+  for (std::size_t k = first; k < first + count; ++k)
+    found.push_back(noise_of(input_of(s, order[k]), s.fits[order[k]]));
+  for (double NoiseModel::*part :
+       {&NoiseModel::white_v, &NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::slow_s, &NoiseModel::edge}) {
+    std::vector<double> values;
+    for (const NoiseModel& n : found) values.push_back(n.*part);
+    s.noise.*part = measurement::median(values);
+  }
+}
+
+/// The cells without accusations that are usual, or all usual ones if every one is accused.
+std::vector<std::size_t> reference_of(const State& s) {
+  std::vector<std::size_t> cells = usual_cells(s.pack);
+  std::vector<std::size_t> clean = cells;
+  std::erase_if(clean, [&](std::size_t c) {
+    return std::any_of(s.accused.begin(), s.accused.end(), [&](const Accusation& a) { return a.touches(c); });
+  });
+  return clean.size() < 2 ? cells : clean;
+}
+
+/// A parameter by which so many cells differ that they are no exceptions; nothing without such a parameter.
+std::optional<Eigen::Index> common_difference(const State& s) {
+  const double most = std::max(limits.exceptions, limits.exceptions_share * static_cast<double>(s.pack.cells()));
+  for (std::size_t p = 0; p < parameter_count; ++p) {
+    const auto count = std::count_if(s.accused.begin(), s.accused.end(), [&](const Accusation& a) {
+      return parameter_of(a.cause) == p && std::find(s.late.begin(), s.late.end(), a) == s.late.end();
+    });
+    if (static_cast<double>(count) > most) return static_cast<Eigen::Index>(p);
+  }
+  return std::nullopt;
+}
+
+bool mostly_held(const State& s) {
+  return static_cast<double>(s.channels.repeated().size()) >=
+         limits.channels.most_channels * static_cast<double>(s.pack.cells());
+}
+
+void accuse(State& s) {
+  s.healthy = healthy_spread(s.fits, s.track.r0_ohm);
+  for (int round = 0; round < limits.fit.widenings; ++round) {
+    s.accused = select(PackLikelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s), s.late);
+    const std::optional<Eigen::Index> common = common_difference(s);
+    if (!common) return;
+    s.healthy[*common] *= limits.wider;
+  }
+}
+
+void fit_and_accuse(State& s) {
+  s.healthy = least_spread(s.track.r0_ohm);
+  s.noise = {.white_v = limits.noise.white_v, .fast_v = limits.noise.fast_v, .slow_v = limits.noise.slow_v};
+  set_neighbours(s.track, s.pack, reference_of(s), mostly_held(s));
+  s.fits.resize(s.pack.cells());
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    s.fits[c].theta[delay] = s.channels.cells[c].lag_s;
+    for (std::size_t k = 0; k < s.pack.rows(); ++k)
+      s.fits[c].difference_v.push_back(s.pack.cell_v[c][k] - s.track.neighbours_v[k]);
+  }
+  constexpr const PackThresholds::Shares& done = limits.done;
+  fit_all(s, true, done.channels, done.first);
+  // the OCV bends: a fit from the state of the neighbours may end where another one is better
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    const Vector start = starting_point(input_of(s, c), s.channels.cells[c].lag_s);
+    CellFit other = fit_cell(input_of(s, c), start, prior_of(s, c, true), noise_for(s, c));
+    if (other.cost < s.fits[c].cost) s.fits[c] = std::move(other);
+  }
+  learn_noise(s);
+  fit_all(s, true, done.noise, done.second);
+  accuse(s);
+  // again around the accusations, with neighbours that are not accused
+  set_neighbours(s.track, s.pack, reference_of(s), mostly_held(s));
+  fit_all(s, false, done.second, done.third);
+  accuse(s);
+  fit_all(s, false, done.third, 1);
+}
+
+/// First time from which on this accusation was named and was the best one.
+std::optional<double> named_after_s(const State& s, const PackLikelihood& likelihood,
+                                    const std::vector<Accusation>& others, const Accusation& a) {
+  std::optional<double> since;
+  for (std::size_t c = 0; c <= likelihood.last_checkpoint(); ++c) {
+    const double gain = likelihood.gain(others, a, c);
+    bool best = gain >= likelihood.least_gain();
+    for (const Accusation& rival : likelihood.rivals_of(a)) best = best && likelihood.gain(others, rival, c) <= gain;
+    if (!best) since.reset();
+    if (best && !since) since = s.fits.front().until[c].until_s - s.pack.time_s.front();
+  }
+  return since;
+}
+
+PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
+  std::vector<Accusation> others = s.accused;
+  std::erase(others, a);
+  const std::size_t now = likelihood.last_checkpoint();
+  const Estimated size = likelihood.size(s.accused, a, now);
+  PackFinding f;
+  f.cause = a.cause;
+  f.cell = a.cell;
+  f.value = size.value;
+  f.sigma = size.sigma;
+  f.gain = likelihood.gain(others, a, now);
+  double sum = 1;
+  for (const Accusation& rival : likelihood.rivals_of(a)) {
+    if (std::find(others.begin(), others.end(), rival) != others.end()) continue;
+    std::vector<Accusation> instead = others;
+    instead.push_back(rival);
+    const double odds = std::exp(likelihood.gain(others, rival, now) - f.gain);
+    if (!likelihood.is_possible(rival, likelihood.size(instead, rival, now))) continue;
+    sum += odds;
+    f.rivals.push_back({rival.cause, rival.cell, odds});
+  }
+  // nothing at all is one of the alternatives
+  const double nothing = std::exp(likelihood.least_gain() - limits.least_odds - f.gain);
+  f.probability = 1 / (sum + nothing);
+  for (Rival& r : f.rivals) r.probability *= f.probability;
+  std::erase_if(f.rivals, [](const Rival& r) { return r.probability < limits.listed_from; });
+  if (std::find(s.late.begin(), s.late.end(), a) != s.late.end()) {
+    f.rivals.clear();
+    f.probability = 1;
+  }
+  std::stable_sort(f.rivals.begin(), f.rivals.end(),
+                   [](const Rival& x, const Rival& y) { return x.probability > y.probability; });
+  f.after_s = named_after_s(s, likelihood, others, a);
+  if (a.cause == Cause::capacity) {  // from 1 / capacity to capacity
+    f.sigma /= (1 + f.value) * (1 + f.value);
+    f.value = f.value / (1 + f.value);
+  }
+  return f;
+}
+
+/// Channels of the pack that are sampled at different times, against the spread that noise gives.
+std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likelihood) {
+  std::vector<double> delays, sigmas;
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    if (s.channels.cells[c].held_s) continue;
+    const Accusation a{Cause::late, c};
+    const Estimated e = likelihood.size({a}, a, likelihood.last_checkpoint());
+    delays.push_back(e.value);
+    sigmas.push_back(e.sigma);
+  }
+  if (delays.size() < limits.unexplained.cells) return std::nullopt;
+  const double sigma = measurement::median(sigmas);
+  const double spread = s.healthy[delay];
+  if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
+  // from the first to the last one, without single late channels
+  std::sort(delays.begin(), delays.end());
+  const std::size_t few = delays.size() / (2 * limits.unexplained.cells);
+  PackFinding f;
+  f.cause = Cause::staggered;
+  f.value = delays[delays.size() - 1 - few] - delays[few];
+  f.sigma = std::hypot(sigma, sigma);
+  f.gain = spread / sigma;
+  f.probability = 1;
+  return f;
+}
+
+void add_held(const State& s, std::vector<PackFinding>& findings) {
+  const std::vector<std::size_t> repeated = s.channels.repeated();
+  const auto finding = [&](const std::vector<std::size_t>& cells) {
+    std::vector<double> times;
+    for (const std::size_t c : cells) times.push_back(*s.channels.cells[c].held_s);
+    PackFinding f;
+    f.cause = Cause::repeated;
+    if (cells.size() == 1) f.cell = cells.front();
+    f.cells = cells;
+    f.value = measurement::median(times);
+    for (double& t : times) t = std::abs(t - f.value);
+    f.sigma = measurement::median(times) / abs_median_of_normal;
+    f.probability = 1;
+    findings.push_back(std::move(f));
+  };
+  if (mostly_held(s)) {
+    finding(repeated);
+    return;
+  }
+  for (const std::size_t c : repeated) finding({c});
+}
+
+void add_missing(const State& s, std::vector<PackFinding>& findings) {
+  for (std::size_t c = 0; c < s.pack.cells(); ++c) {
+    const double share = s.channels.cells[c].missing_share;
+    if (share < limits.channels.missing_share) continue;
+    PackFinding f;
+    f.cause = Cause::missing;
+    f.cell = c;
+    f.value = share;
+    f.probability = 1;
+    findings.push_back(std::move(f));
+  }
+}
+
+Verdict verdict_of(const PackDiagnosis& d) {
+  std::size_t data = 0, ambiguous = 0;
+  for (const PackFinding& f : d.findings) {
+    if (is_of_data(f.cause)) ++data;
+    if (!f.rivals.empty() && f.rivals.front().probability > limits.ambiguous_from) ++ambiguous;
+  }
+  if (d.findings.size() > data) {
+    if (ambiguous > 0) return Verdict::ambiguous;
+    return d.findings.size() - data > 1 ? Verdict::causes : Verdict::cause;
+  }
+  if (data > 0) return Verdict::data_fault;
+  return d.unexplained.empty() ? Verdict::no_mismatch : Verdict::unknown;
+}
+
+/// The cell without accusations whose fit is in the middle.
+std::size_t typical_cell(const State& s) {
+  const std::vector<std::size_t> reference = reference_of(s);
+  return reference[reference.size() / 2];
+}
+
+}  // namespace
+
+PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& pack, const PackOptions& options) {
+  State s{.options = options,
+          .pack = pack,
+          .track = track_of(cell, pack),
+          .channels = {},
+          .bad_sensors = {},
+          .fits = {},
+          .noise = {},
+          .late = {},
+          .accused = {}};
+  PackDiagnosis d;
+  d.cells = pack.cells();
+  d.duration_s = pack.time_s.back() - pack.time_s.front();
+  const std::vector<PackFinding> of_voltmeter = check_pack_voltage(pack, s.track);
+  s.progress(0, "channels");
+  s.channels = check_channels(s.track, pack);
+  for (const std::size_t c : s.channels.late(s.track.step_s)) s.late.push_back({Cause::late, c});
+  s.accused = s.late;
+  s.bad_sensors = check_thermistors(pack);
+  fit_and_accuse(s);
+  const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
+  add_held(s, d.findings);
+  if (const auto f = staggered(s, likelihood)) d.findings.push_back(*f);
+  add_missing(s, d.findings);
+  for (const Accusation& a : s.accused) d.findings.push_back(finding_of(s, likelihood, a));
+  d.findings.insert(d.findings.end(), s.bad_sensors.begin(), s.bad_sensors.end());
+  d.findings.insert(d.findings.end(), of_voltmeter.begin(), of_voltmeter.end());
+  std::vector<std::size_t> explained;
+  for (const Accusation& a : s.accused) explained.push_back(a.cell);
+  d.unexplained = unexplained_cells(pack, s.fits, explained, d.noise_v);
+  const Matrix& information = s.fits[typical_cell(s)].all().of_parameters;
+  d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm);
+  d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood.least_gain());
+  d.reference = reference_of(s);
+  d.channels = s.channels;
+  return d;
+}
+
+void conclude(PackDiagnosis& d) {
+  std::stable_partition(d.findings.begin(), d.findings.end(), [](const PackFinding& f) { return is_of_data(f.cause); });
+  for (PackFinding& f : d.findings) {
+    if (f.cause == Cause::repeated) f.because = confirmation_of(d.channels, f.cells);
+  }
+  d.verdict = verdict_of(d);
+  d.statement = statement_of(d);
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,134 @@
+#include "diagnosis/pack/isolability.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "diagnosis/pack/pack_likelihood.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+/// Two neighbours and the wire between them: parameters of the first, of the second, the wire's offset.
+constexpr Eigen::Index pair_width = 2 * width + 1;
+
+/// Which parameters another instrument would see as this channel does: its own offset, gain and delay are not those of
+/// the channel.
+struct Sensor {
+  const char* name;
+  bool cell, joint;  ///< sees the cell; sees the connection
+};
+constexpr std::array sensors = {
+    Sensor{"a second voltmeter on the cell, with wires of its own, that includes the connection", true, true},
+    Sensor{"a voltmeter on the poles of the cell itself, without the connection", true, false},
+    Sensor{"a voltmeter over the connection alone", false, true},
+};
+
+struct Data {
+  Eigen::MatrixXd information;
+  Eigen::VectorXd healthy;
+};
+
+/// Two cells with the channels that they have, and with another instrument on the first one.
+Data data_of(const Matrix& information, const Vector& healthy, const Sensor* added) {
+  Data d{Eigen::MatrixXd::Zero(pair_width, pair_width), Eigen::VectorXd::Zero(pair_width)};
+  for (Eigen::Index cell = 0; cell < 2; ++cell) {
+    Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
+    into.middleCols(cell * width, width).setIdentity();
+    into(offset, 2 * width) = cell == 0 ? 1 : -1;
+    d.information += into.transpose() * information * into;
+    d.healthy.segment(cell * width, width) = healthy;
+  }
+  if (added != nullptr) {
+    Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
+    for (const Parameter p :
+         {charge, capacity, leak, resistance, polarisation, slope, temperature, shape_1, shape_2, shape_3})
+      into(p, p) = added->cell ? 1 : 0;
+    into(joint, joint) = added->joint ? 1 : 0;
+    d.information += into.transpose() * information * into;
+  }
+  return d;
+}
+
+Eigen::Index place_of(Cause cause) {
+  return cause == Cause::sense_wire ? 2 * width : static_cast<Eigen::Index>(parameter_of(cause));
+}
+
+double marginal_for(const Data& d, const Eigen::VectorXd& with_data, Cause cause, const Vector& fault) {
+  Eigen::VectorXd prior = d.healthy;
+  const Eigen::Index p = place_of(cause);
+  const double wide = cause == Cause::sense_wire ? fault[offset] : fault[p];
+  prior[p] = std::hypot(prior[p], wide);
+  return log_marginal(d.information, with_data, prior);
+}
+
+double example_of(Cause cause, double r0_ohm) {
+  const Parameter p = parameter_of(cause);
+  return limits.spread[p].example * (p == joint ? r0_ohm : 1);
+}
+
+std::vector<std::vector<bool>> separable(const Data& d, double r0_ohm) {
+  const Vector fault = fault_spread(r0_ohm);
+  std::vector<std::vector<bool>> table;
+  for (const Cause present : cell_causes) {
+    const Eigen::VectorXd with_data = d.information.col(place_of(present)) * example_of(present, r0_ohm);
+    const double right = marginal_for(d, with_data, present, fault),
+                 nothing = log_marginal(d.information, with_data, d.healthy);
+    std::vector<bool> row;
+    for (const Cause other : cell_causes) {
+      const double against = other == present ? nothing : marginal_for(d, with_data, other, fault);
+      row.push_back(right - against > limits.separable_odds);
+    }
+    table.push_back(std::move(row));
+  }
+  return table;
+}
+
+std::size_t pairs_in(const std::vector<std::vector<bool>>& table) {
+  std::size_t count = 0;
+  for (std::size_t a = 0; a < table.size(); ++a) {
+    for (std::size_t b = a + 1; b < table.size(); ++b) count += table[a][b] && table[b][a] ? 1 : 0;
+  }
+  return count;
+}
+
+}  // namespace
+
+Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm) {
+  Isolability result;
+  result.causes.assign(cell_causes.begin(), cell_causes.end());
+  result.separable = separable(data_of(information, healthy, nullptr), r0_ohm);
+  const std::size_t now = pairs_in(result.separable);
+  for (const Sensor& sensor : sensors) {
+    const std::size_t then = pairs_in(separable(data_of(information, healthy, &sensor), r0_ohm));
+    result.added.push_back({sensor.name, then > now ? then - now : 0});
+  }
+  std::stable_sort(result.added.begin(), result.added.end(),
+                   [](const auto& a, const auto& b) { return a.pairs > b.pairs; });
+  return result;
+}
+
+std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
+                                           double least_gain) {
+  const Data d = data_of(information, healthy, nullptr);
+  const Vector fault = fault_spread(r0_ohm);
+  std::vector<PackLimit> list;
+  for (const Cause cause : cell_causes) {
+    const Parameter p = parameter_of(cause);
+    const double least = limits.spread[p].least * (p == joint ? r0_ohm : 1);
+    // the gain is a square of the size minus a constant
+    const auto gain_at = [&](double size) {
+      const Eigen::VectorXd with_data = d.information.col(place_of(cause)) * size;
+      return marginal_for(d, with_data, cause, fault) - log_marginal(d.information, with_data, d.healthy);
+    };
+    const double constant = gain_at(0), of_example = gain_at(example_of(cause, r0_ohm)) - constant;
+    if (!(of_example > 0)) continue;
+    const double size = example_of(cause, r0_ohm) * std::sqrt((least_gain - constant) / of_example);
+    list.push_back({cause, std::max(least, size)});
+  }
+  return list;
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,286 @@
+#include "diagnosis/pack/pack_likelihood.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+#include "diagnosis/pack/pack_thresholds.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+Vector from_limits(double r0_ohm, double Spread::*which) {
+  Vector v;
+  for (std::size_t p = 0; p < parameter_count; ++p)
+    v[static_cast<Eigen::Index>(p)] = (p == joint ? r0_ohm : 1) * limits.spread[p].*which;
+  return v;
+}
+
+bool only_positive(Cause cause) {
+  return cause == Cause::capacity || cause == Cause::leakage || cause == Cause::resistance || cause == Cause::joint;
+}
+
+/// Without one of them.
+std::vector<Accusation> without(std::vector<Accusation> list, const Accusation& one) {
+  std::erase(list, one);
+  return list;
+}
+
+std::vector<Accusation> with(std::vector<Accusation> list, const Accusation& one) {
+  list.push_back(one);
+  return list;
+}
+
+/// What a further cause in the same cell must gain in addition: the model of the first one is not exact.
+double price(const PackLikelihood& likelihood, const std::vector<Accusation>& others, const Accusation& added) {
+  double sum = 0;
+  for (const Accusation& o : others) {
+    if (!added.touches(o.cell) && !o.touches(added.cell)) continue;
+    sum += limits.further_in_cell +
+           limits.share_of_first * std::max(0.0, likelihood.gain(without(others, o), o, likelihood.last_checkpoint()));
+  }
+  return sum;
+}
+
+/// Share of the cells that are taken for healthy. A median would overlook channels that are read in two groups, and
+/// heavy tails.
+double usual_share(std::size_t cells) {
+  return 1 - std::max(limits.outlying_share, limits.outlying_cells / static_cast<double>(cells));
+}
+
+/// The square of the quantile of |x|, x standard normal.
+double square_of_quantile(double share) {
+  double low = 0, high = limits.widest_quantile;
+  while (high - low > limits.quantile_accuracy) {
+    const double middle = (low + high) / 2;
+    (std::erf(middle / std::numbers::sqrt2) < share ? low : high) = middle;
+  }
+  return low * low;
+}
+
+}  // namespace
+
+Vector least_spread(double r0_ohm) { return from_limits(r0_ohm, &Spread::healthy); }
+Vector fault_spread(double r0_ohm) { return from_limits(r0_ohm, &Spread::fault); }
+
+double log_marginal(const Eigen::MatrixXd& information, const Eigen::VectorXd& with_data,
+                    const Eigen::VectorXd& prior) {
+  Eigen::MatrixXd m = prior.asDiagonal() * information * prior.asDiagonal();
+  m.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::MatrixXd> factor(m);
+  const Eigen::VectorXd scaled = prior.asDiagonal() * with_data;
+  const double log_determinant = 2 * factor.matrixLLT().diagonal().array().log().sum();
+  return (scaled.dot(factor.solve(scaled)) - log_determinant) / 2;
+}
+
+PackLikelihood::PackLikelihood(const std::vector<CellFit>& fits, const Vector& healthy, double r0_ohm, double days,
+                               double step_s)
+    : fits_(fits), healthy_(healthy), fault_(fault_spread(r0_ohm)), least_(from_limits(r0_ohm, &Spread::least)) {
+  least_[delay] = std::max(least_[delay], limits.channels.least_rows_late * step_s);
+  // a leak must have moved the charge by what is worth a visit
+  least_[leak] = std::max(least_[leak], least_[charge] / std::max(days, std::numeric_limits<double>::epsilon()));
+}
+
+PackLikelihood::System PackLikelihood::system_of(const std::vector<Accusation>& accusations,
+                                                 const std::vector<std::size_t>& cells, std::size_t checkpoint) const {
+  std::vector<Accusation> wires;
+  for (const Accusation& a : accusations) {
+    if (a.cause == Cause::sense_wire) wires.push_back(a);
+  }
+  std::erase_if(wires, [&](const Accusation& w) {
+    return std::none_of(cells.begin(), cells.end(), [&](std::size_t c) { return w.touches(c); });
+  });
+  const auto of_cells = static_cast<Eigen::Index>(cells.size()) * width;
+  const auto size = of_cells + static_cast<Eigen::Index>(wires.size());
+  System s{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), Eigen::VectorXd::Zero(size)};
+  // columns: those of each cell, then a wire each; `into` maps the parameters of all to those of one cell
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, size);
+    const auto at = static_cast<Eigen::Index>(k) * width;
+    into.middleCols(at, width).setIdentity();
+    for (std::size_t w = 0; w < wires.size(); ++w) {
+      if (!wires[w].touches(cells[k])) continue;
+      into(offset, of_cells + static_cast<Eigen::Index>(w)) = wires[w].cell == cells[k] ? 1 : -1;
+    }
+    const Information& data = fits_[cells[k]].until[checkpoint];
+    s.information += into.transpose() * data.of_parameters * into;
+    s.with_data += into.transpose() * data.with_data;
+    s.prior.segment(at, width) = healthy_;
+    for (const Accusation& a : accusations) {
+      if (a.cause == Cause::sense_wire || a.cell != cells[k]) continue;
+      const auto p = static_cast<Eigen::Index>(parameter_of(a.cause));
+      s.prior[at + p] = std::hypot(healthy_[p], fault_[p]);
+    }
+  }
+  s.prior.tail(static_cast<Eigen::Index>(wires.size())).setConstant(fault_[offset]);
+  return s;
+}
+
+double PackLikelihood::of(const std::vector<Accusation>& accusations, const std::vector<std::size_t>& cells,
+                          std::size_t checkpoint) const {
+  const System s = system_of(accusations, cells, checkpoint);
+  return log_marginal(s.information, s.with_data, s.prior);
+}
+
+std::vector<std::size_t> PackLikelihood::cells_of(const std::vector<Accusation>& accusations,
+                                                  const Accusation& around) const {
+  std::vector<std::size_t> cells = {around.cell};
+  if (around.cause == Cause::sense_wire) cells.push_back(around.cell + 1);
+  // sense wires connect cells to chains
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const Accusation& a : accusations) {
+      if (a.cause != Cause::sense_wire) continue;
+      const auto has = [&](std::size_t c) { return std::find(cells.begin(), cells.end(), c) != cells.end(); };
+      if (has(a.cell) == has(a.cell + 1)) continue;
+      cells.push_back(has(a.cell) ? a.cell + 1 : a.cell);
+      grown = true;
+    }
+  }
+  std::sort(cells.begin(), cells.end());
+  return cells;
+}
+
+double PackLikelihood::gain(const std::vector<Accusation>& others, const Accusation& added,
+                            std::size_t checkpoint) const {
+  const std::vector<Accusation> all = with(others, added);
+  const std::vector<std::size_t> cells = cells_of(all, added);
+  return of(all, cells, checkpoint) - of(others, cells, checkpoint);
+}
+
+Estimated PackLikelihood::size(const std::vector<Accusation>& accusations, const Accusation& wanted,
+                               std::size_t checkpoint) const {
+  const std::vector<std::size_t> cells = cells_of(accusations, wanted);
+  const System s = system_of(accusations, cells, checkpoint);
+  Eigen::MatrixXd normal = s.information;
+  normal.diagonal() += s.prior.array().square().inverse().matrix();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+  Eigen::Index at = static_cast<Eigen::Index>(cells.size()) * width;
+  if (wanted.cause == Cause::sense_wire) {
+    for (const Accusation& a : accusations) {
+      if (a == wanted) break;
+      const bool inside = std::any_of(cells.begin(), cells.end(), [&](std::size_t c) { return a.touches(c); });
+      if (a.cause == Cause::sense_wire && inside) ++at;
+    }
+  } else {
+    const auto place = std::find(cells.begin(), cells.end(), wanted.cell) - cells.begin();
+    at = place * width + static_cast<Eigen::Index>(parameter_of(wanted.cause));
+  }
+  Eigen::VectorXd unit = Eigen::VectorXd::Zero(normal.rows());
+  unit[at] = 1;
+  const Eigen::VectorXd column = factor.solve(unit);
+  const double value = column.dot(s.with_data);
+  return {value,
+          std::hypot(std::sqrt(std::max(0.0, column[at])), limits.spread[parameter_of(wanted.cause)].scale * value)};
+}
+
+std::vector<Accusation> PackLikelihood::candidates_at(std::size_t cell) const {
+  std::vector<Accusation> list;
+  for (const Cause cause : cell_causes) {
+    if (cause != Cause::sense_wire || cell + 1 < cells()) list.push_back({cause, cell});
+  }
+  return list;
+}
+
+std::vector<Accusation> PackLikelihood::rivals_of(const Accusation& a) const {
+  std::vector<Accusation> list = candidates_at(a.cell);
+  if (a.cell > 0) list.push_back({Cause::sense_wire, a.cell - 1});
+  if (a.cause == Cause::sense_wire) {
+    for (const Accusation& next : candidates_at(a.cell + 1)) list.push_back(next);
+  }
+  std::erase(list, a);
+  return list;
+}
+
+double PackLikelihood::least_gain() const {
+  return std::log(static_cast<double>(cells() * cell_causes.size()) / limits.fault_prior) + limits.least_odds;
+}
+
+bool PackLikelihood::is_possible(const Accusation& a, const Estimated& size) const {
+  const auto p = static_cast<Eigen::Index>(parameter_of(a.cause));
+  if (only_positive(a.cause) && size.value < 0) return false;
+  return std::abs(size.value) > least_[p] && std::abs(size.value) > limits.least_sigmas * size.sigma;
+}
+
+Vector healthy_spread(const std::vector<CellFit>& fits, double r0_ohm) {
+  const Vector least = least_spread(r0_ohm);
+  Vector spread = least;
+  for (int round = 0; round < limits.fit.scale_rounds; ++round) {
+    std::vector<std::vector<double>> squares(parameter_count), variances(parameter_count);
+    for (const CellFit& fit : fits) {
+      Matrix normal = fit.all().of_parameters;
+      normal.diagonal() += spread.array().square().inverse().matrix();
+      const Matrix covariance = normal.inverse();
+      const Vector theta = covariance * fit.all().with_data;
+      for (Eigen::Index p = 0; p < width; ++p) {
+        squares[static_cast<std::size_t>(p)].push_back(theta[p] * theta[p]);
+        variances[static_cast<std::size_t>(p)].push_back(covariance(p, p));
+      }
+    }
+    for (Eigen::Index p = 0; p < width; ++p) {
+      const auto k = static_cast<std::size_t>(p);
+      const double of_estimates =
+          measurement::quantile(squares[k], usual_share(fits.size())) / square_of_quantile(usual_share(fits.size()));
+      spread[p] = std::clamp(std::sqrt(of_estimates + measurement::median(variances[k])), least[p],
+                             limits.spread[k].most * least[p]);
+    }
+  }
+  return spread;
+}
+
+std::vector<Accusation> select(const PackLikelihood& likelihood, const std::vector<Accusation>& certain) {
+  const std::size_t now = likelihood.last_checkpoint();
+  std::vector<Accusation> chosen = certain;
+  const auto is_certain = [&](const Accusation& a) {
+    return std::find(certain.begin(), certain.end(), a) != certain.end();
+  };
+  const auto possible = [&](const std::vector<Accusation>& others, const Accusation& a) {
+    return likelihood.is_possible(a, likelihood.size(with(others, a), a, now));
+  };
+  const auto exchange = [&] {
+    for (Accusation& a : chosen) {
+      if (is_certain(a)) continue;
+      const std::vector<Accusation> others = without(chosen, a);
+      double best = likelihood.gain(others, a, now);
+      for (const Accusation& rival : likelihood.rivals_of(a)) {
+        if (std::find(chosen.begin(), chosen.end(), rival) != chosen.end()) continue;
+        const double gain = likelihood.gain(others, rival, now);
+        if (gain <= best || !possible(others, rival)) continue;
+        best = gain;
+        a = rival;
+      }
+    }
+  };
+  while (chosen.size() < limits.most_causes) {
+    Accusation found;
+    double best = likelihood.least_gain();
+    bool any = false;
+    for (std::size_t cell = 0; cell < likelihood.cells(); ++cell) {
+      for (const Accusation& a : likelihood.candidates_at(cell)) {
+        if (std::find(chosen.begin(), chosen.end(), a) != chosen.end()) continue;
+        const double gain = likelihood.gain(chosen, a, now) - price(likelihood, chosen, a);
+        if (gain <= best || !possible(chosen, a)) continue;
+        best = gain;
+        found = a;
+        any = true;
+      }
+    }
+    if (!any) break;
+    chosen.push_back(found);
+    exchange();
+  }
+  std::erase_if(chosen, [&](const Accusation& a) {
+    if (is_certain(a)) return false;
+    const std::vector<Accusation> others = without(chosen, a);
+    return likelihood.gain(others, a, now) < likelihood.least_gain() || !possible(others, a);
+  });
+  return chosen;
+}
+
+}  // namespace bms::diagnosis::pack

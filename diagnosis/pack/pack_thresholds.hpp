@@ -1,0 +1,134 @@
+// Numbers that a verdict on a pack depends on. Chosen on development seeds of the simulated packs; the final seed and
+// the recordings of real cars were not used.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include "diagnosis/pack/causes.hpp"
+
+namespace bms::diagnosis::pack {
+
+/// The spread of one parameter over the cells of a pack.
+struct Spread {
+  double healthy;  ///< standard deviation of healthy cells, at least; the pack itself can show a larger one
+  double fault;    ///< standard deviation of a faulty one
+  double least;    ///< a smaller size is not worth a visit and is never named
+  double example;  ///< size for the table of what can be separated
+  double most;     ///< spread that a pack may show, over `healthy`
+  double scale;    ///< relative error of a size: what all cells share is not known better
+};
+
+struct PackThresholds {
+  /// By parameter. Resistances of a joint are relative to R0 of the cell file at half charge.
+  std::array<Spread, parameter_count> spread = {{
+      {0.004, 0.06, 0.015, 0.04, 6, 0.05},     // charge: a balanced pack is good to 1 %
+      {0.010, 0.15, 0.04, 0.12, 6, 0.1},       // capacity: cells of a batch differ by 1 %
+      {0.0005, 0.03, 0.003, 0.02, 6, 0.1},     // leak: 1 % a month is healthy
+      {0.03, 0.5, 0.12, 0.3, 6, 0.05},         // resistance
+      {0.05, 0, 0, 0, 12, 0},                  // polarisation: no cause of its own
+      {0.02, 0.5, 0.12, 0.3, 6, 0.05},         // joint
+      {0.001, 0.03, 0.004, 0.010, 12, 0.02},   // offset: what a monitor's datasheet states
+      {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},  // gain: as stated; what varies with the voltage is the slope
+      {0.0005, 0, 0, 0, 8, 0},                 // slope: no cause of its own
+      {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
+      {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
+      {0.0005, 0, 0, 0, 8, 0},                 // shapes of the OCV curve: healthy cells age differently
+      {0.0005, 0, 0, 0, 8, 0},
+      {0.0005, 0, 0, 0, 8, 0},
+  }};
+  double most_spread = 12;  ///< of the spread that a pack may show, over that of healthy cells
+  double outlying_share = 0.2, outlying_cells = 2.5;     ///< so many cells of a pack may be faulty in one parameter
+  double widest_quantile = 4, quantile_accuracy = 1e-4;  ///< of the search for a quantile of the normal distribution
+  double hours_per_day = 24;
+  double instant_rows = 30;  ///< differences to the model that last longer are not steps within a row
+  /// More cells than that with the same cause are no exceptions: the pack's spread is as large.
+  double exceptions = 3, exceptions_share = 0.06;
+  double wider = 1.5;            ///< factor on the spread then
+  double fault_prior = 0.05;     ///< that any single cause is present somewhere in a pack
+  double least_odds = 4;         ///< [ln] posterior odds from which on a cause is named
+  double further_in_cell = 6;    ///< [ln] more for a further cause in the same cell,
+  double share_of_first = 0.03;  ///< and this share of what the first one gained: its model is not better
+  double least_sigmas = 4;       ///< size over its standard deviation
+  double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
+  double listed_from = 0.01;     ///< probability from which on another cause is listed
+  std::size_t most_causes = 20;  ///< of one pack
+  std::size_t checkpoints = 32;  ///< times at which the verdict is formed again
+  double separable_odds = 3;     ///< [ln] expected odds of the right cause against the other one
+
+  struct Noise {
+    double quiet_c = 0.01;                    ///< [C] step of the current below which second differences show the noise
+    double white_v = 0.001;                   ///< if there are too few quiet rows
+    double fast_v = 0.0005, slow_v = 0.0005;  ///< starting values
+    double edge_share = 0.01;   ///< of R0 times a step of the current: error at the step, before it is learned
+    double ocv_axis = 0.001;    ///< error of the OCV's SOC axis between cells
+    double ocv_reach = 0.02;    ///< difference in SOC over which errors of the OCV curve become independent
+    double shape_share = 0.02;  ///< error of a resistance's course, as a share of what a fault adds to it
+    double jitter_s = 0.002;    ///< of the sampling
+    std::size_t cells = 8;      ///< from which the noise is learned
+    std::array<double, 4> factors = {2, 1.41, 1.19, 1.09};  ///< of the search, in this order
+    double least_v = 2e-5, most_v = 0.1;                    ///< of each part
+  } noise;
+
+  struct Channels {
+    double glitch_v = 0.05;         ///< beyond the movement of the model around it
+    std::size_t moved_rows = 12;    ///< before and after, in which the model may move as far as the reading
+    std::size_t glitch_rows = 150;  ///< before and after, whose median is compared
+    double moving_steps = 3;        ///< steps of the converter by which the model moves, so that a reading must change
+    double moving_at_least_v = 0.003;
+    std::size_t moving_rows = 12;           ///< at least
+    double held_share = 0.34;               ///< of moving rows without a change, from which on a channel is held
+    double most_channels = 0.5;             ///< share from which on it is the pack's way of reading
+    double lag_from_s = -3, lag_to_s = 30;  ///< searched
+    double lag_gain = 0.1;                  ///< share of the error that a lag must explain
+    double late_rows = 1.5;                 ///< from which on a lag is certain
+    double grouped_share = 0.25;            ///< more channels than that are a group that is read later
+    double least_rows_late = 0.5;           ///< of a delay that is named: less is a matter of the sampling
+    double staggered_s = 0.05;              ///< spread of sampling times that is reported
+    double staggered_sigmas = 6;            ///< the same over its standard deviation
+    double missing_share = 0.2;             ///< of readings
+    double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
+  } channels;
+
+  struct Sensors {
+    double healthy_k = 1.2;       ///< difference of a temperature sensor to the median, at the start
+    std::size_t start_rows = 60;  ///< whose median is the start
+    double odds = 9;              ///< [ln] as least_odds, with the number of sensors
+    double fault_k = 20;          ///< standard deviation of a faulty one
+    double least_k = 3;
+    std::size_t least_sensors = 3;                        ///< two sensors do not show which one is wrong
+    double pack_gain = 0.004, pack_offset_share = 0.002;  ///< healthy voltmeter of a pack
+    double pack_joint_share = 0.1;  ///< of the cells' resistance: cables and contactors within the pack's voltage
+    double pack_sigmas = 5;         ///< times the healthy spread, from which on it is named
+    double parallel_v = 0.002;      ///< error of a cell's channel that all cells share
+  } sensors;
+
+  struct Unexplained {
+    double block_s = 300;    ///< over which unexplained differences are averaged
+    double ratio = 3;        ///< of the mean square to that of the median cell
+    double scales = 8;       ///< times the robust spread of its logarithm over the cells
+    std::size_t cells = 6;   ///< at least
+    double least_v = 0.002;  ///< RMS of a block mean that is worth a look
+  } unexplained;
+
+  /// Of the progress that is shown.
+  struct Shares {
+    double channels = 0.1, first = 0.4, noise = 0.5, second = 0.7, third = 0.9;
+  } done;
+
+  struct Fit {
+    int iterations = 4, halvings = 3;
+    int scale_rounds = 12, widenings = 16;
+    double most_charge = 0.08, charge_step = 0.01, most_capacity = 0.3, capacity_step = 0.05;  ///< starting points
+    std::size_t starting_rows = 600;
+    double converged = 0.05;  ///< gain in cost
+    double most_soc_step = 0.5;
+  } fit;
+};
+
+inline constexpr PackThresholds limits{};
+
+/// Constants of the normal distribution.
+inline constexpr double abs_median_of_normal = 0.6745, chi_square_median = 0.4549;
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,139 @@
+#include "diagnosis/pack/track.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "diagnosis/pack/pack_thresholds.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+/// What the neighbours' voltage says of the current beyond its mean over the row: fast differences to the model only.
+void set_instant(Track& track, const PackRecording& pack) {
+  track.instant_a = pack.current_a;
+  double slow_v = no_value, last_s = pack.time_s.front();
+  std::uint8_t interval = 0;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    const double apart_v = track.neighbours_v[k] - track.model_v[k];
+    if (!std::isfinite(apart_v)) continue;
+    if (!std::isfinite(slow_v)) slow_v = apart_v;
+    const double step_s = pack.time_s[k] - last_s;
+    last_s = pack.time_s[k];
+    const double r0_ohm = model::look_up(track.cell, track.soc[k], interval).r0_ohm;
+    track.instant_a[k] += (apart_v - slow_v) / r0_ohm;
+    slow_v += -std::expm1(-std::max(step_s, 0.0) / (limits.instant_rows * track.step_s)) * (apart_v - slow_v);
+  }
+}
+
+}  // namespace
+
+double usual_step_s(const PackRecording& pack) {
+  std::vector<double> steps;
+  for (std::size_t k = 1; k < pack.rows(); ++k) steps.push_back(pack.time_s[k] - pack.time_s[k - 1]);
+  return std::max(measurement::median(steps), std::numeric_limits<double>::epsilon());
+}
+
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack) {
+  const PreparedCell prepared = model::prepare<double, model::max_intervals>(cell);
+  Track t;
+  t.cell = prepared;
+  t.r0_ohm = model::look_up(t.cell, 0.5).r0_ohm;
+  t.ocv_tolerance_v = cell.tolerance.ocv_v;
+  t.capacity_ah = cell.capacity_ah;
+  t.soc = pack.soc;
+  t.step_s = usual_step_s(pack);
+  double v_rc_v = 0, last_s = pack.time_s.front();
+  std::uint8_t interval = 0;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
+    const double dt_s = pack.time_s[k] - last_s;
+    last_s = pack.time_s[k];
+    const auto at = model::look_up(t.cell, t.soc[k], interval);
+    v_rc_v += -std::expm1(-dt_s / (at.r1_ohm * at.c1_f)) * (at.r1_ohm * current_a - v_rc_v);
+    t.v_rc_v.push_back(v_rc_v);
+    t.model_v.push_back(at.ocv_v + v_rc_v + at.r0_ohm * current_a);
+    t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));
+  }
+  return t;
+}
+
+namespace {
+
+void set_mean(Track& track, const PackRecording& pack, const std::vector<std::size_t>& reference, bool by_voltmeter) {
+  // by cell: mean difference to the mean, so that a missing reading does not shift the mean of the others
+  std::vector<double> shift(reference.size(), 0.0), count(reference.size(), 0.0);
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    double sum = 0;
+    std::size_t finite = 0;
+    for (const std::size_t c : reference) {
+      sum += pack.cell_v[c][k];
+      if (std::isfinite(pack.cell_v[c][k])) ++finite;
+    }
+    if (finite < reference.size()) continue;
+    for (std::size_t r = 0; r < reference.size(); ++r) {
+      shift[r] += pack.cell_v[reference[r]][k] - sum / static_cast<double>(finite);
+      ++count[r];
+    }
+  }
+  for (std::size_t r = 0; r < reference.size(); ++r) shift[r] = count[r] > 0 ? shift[r] / count[r] : 0;
+  track.neighbours_v.assign(pack.rows(), no_value);
+  const double cells = static_cast<double>(pack.cells());
+  std::vector<double> differences;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    double sum = 0;
+    std::size_t finite = 0;
+    for (std::size_t r = 0; r < reference.size(); ++r) {
+      const double v = pack.cell_v[reference[r]][k] - shift[r];
+      if (!std::isfinite(v)) continue;
+      sum += v;
+      ++finite;
+    }
+    if (2 * finite < reference.size() || finite == 0) continue;
+    track.neighbours_v[k] = sum / static_cast<double>(finite);
+    if (!pack.pack_v.empty()) differences.push_back(pack.pack_v[k] / cells - track.neighbours_v[k]);
+  }
+  if (pack.pack_v.empty() || !by_voltmeter) return;
+  const double apart_v = differences.empty() ? 0 : measurement::median(differences);
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    if (!std::isfinite(track.neighbours_v[k])) track.neighbours_v[k] = pack.pack_v[k] / cells - apart_v;
+  }
+}
+
+}  // namespace
+
+void set_neighbours(Track& track, const PackRecording& pack, const std::vector<std::size_t>& reference,
+                    bool by_voltmeter) {
+  set_mean(track, pack, reference, by_voltmeter);
+  track.mean_v = measurement::mean(track.neighbours_v);
+  set_instant(track, pack);
+}
+
+std::vector<std::size_t> usual_cells(const PackRecording& pack) {
+  const std::size_t cells = pack.cells();
+  std::vector<double> square(cells, 0.0), count(cells, 0.0), row;
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    row.clear();
+    for (const auto& v : pack.cell_v) row.push_back(v[k]);
+    const double middle = measurement::quantile(row, 0.5);
+    for (std::size_t c = 0; c < cells; ++c) {
+      const double apart = pack.cell_v[c][k] - middle;
+      if (!std::isfinite(apart)) continue;
+      square[c] += apart * apart;
+      ++count[c];
+    }
+  }
+  std::vector<std::size_t> order(cells);
+  for (std::size_t c = 0; c < cells; ++c) {
+    order[c] = c;
+    square[c] = count[c] > 0 ? square[c] / count[c] : std::numeric_limits<double>::infinity();
+  }
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return square[a] < square[b]; });
+  order.resize(std::max<std::size_t>(1, (cells + 1) / 2));
+  std::sort(order.begin(), order.end());
+  return order;
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,44 @@
+// What all cells of a pack share, by row: the state of the median cell, and the voltage of the neighbours.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "diagnosis/pack/pack_recording.hpp"
+#include "model/cell.hpp"
+#include "model/cell_parameters.hpp"
+
+namespace bms::diagnosis::pack {
+
+using PreparedCell = model::Cell<double, model::max_intervals>;
+
+struct Track {
+  PreparedCell cell;
+  double r0_ohm = 0;           ///< at half charge
+  double ocv_tolerance_v = 0;  ///< of the cell file
+  double capacity_ah = 0;
+  double step_s = 1;                         ///< usual time between rows
+  std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
+  std::vector<double> days;                  ///< since the start
+  double mean_v = 0;                         ///< of the neighbours
+  std::vector<double> neighbours_v;          ///< mean voltage of the cells that serve as the reference; NaN: unknown
+  /// Current at the moment of sampling: the measured one is a mean over the row. Steps within a row are taken from the
+  /// neighbours' voltage.
+  std::vector<double> instant_a;
+};
+
+/// Median time between rows.
+double usual_step_s(const PackRecording& pack);
+
+/// Without neighbours_v and instant_a.
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack);
+
+/// Sets neighbours_v and instant_a: the mean of these cells. Rows in which less than half of them have a reading have
+/// no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells; for held channels.
+void set_neighbours(Track& track, const PackRecording& pack, const std::vector<std::size_t>& reference,
+                    bool by_voltmeter);
+
+/// The half of the cells that is closest to the median of all.
+std::vector<std::size_t> usual_cells(const PackRecording& pack);
+
+}  // namespace bms::diagnosis::pack

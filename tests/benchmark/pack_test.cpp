@@ -1,0 +1,52 @@
+// Simulated packs with planted faults: the cell and the cause are named, and nothing else.
+#include <gtest/gtest.h>
+
+#include "benchmark/pack_score.hpp"
+#include "benchmark/truth/case_files.hpp"
+#include "benchmark/truth/packs.hpp"
+#include "files/cell_file.hpp"
+#include "workflow/pack_diagnosis.hpp"
+
+namespace bms {
+namespace {
+
+namespace truth = benchmark::truth;
+
+benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy) {
+  const truth::PackCase c = truth::make_pack(seed, index, healthy);
+  measurement::Recording r;
+  r.time_s = c.recording.time_s;
+  r.current_a = c.recording.current_a;
+  for (const auto& v : c.recording.cell_v) r.cell_voltage_v.emplace_back(v);
+  for (const auto& t : c.recording.sensor_c) r.cell_temperature_c.emplace_back(t);
+  r.pack_voltage_v = c.recording.pack_v;
+  workflow::PackOptions options;
+  options.initial_soc = c.given_initial_soc;
+  options.shared = false;
+  const auto cell = files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
+  return benchmark::score_pack(c, workflow::diagnose_pack(cell, r, options).diagnosis);
+}
+
+TEST(Pack, NamesACellWithLessChargeAmongChannelsThatAreReadOneAfterTheOther) {
+  const benchmark::PackOutcome o = outcome_of(2, 10, false);
+  ASSERT_EQ(o.planted.size(), 2);
+  for (const benchmark::PlantedOutcome& p : o.planted) EXPECT_TRUE(p.named) << p.fault.id << ": " << o.statement;
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+TEST(Pack, FindsAHeldChannelAndHowLong) {
+  const benchmark::PackOutcome o = outcome_of(2, 9, false);
+  ASSERT_EQ(o.planted.front().fault.id, "channel_held");
+  EXPECT_TRUE(o.planted.front().named) << o.statement;
+  EXPECT_EQ(o.planted.front().found, o.planted.front().fault.size);
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+TEST(Pack, NamesNothingInAHealthyPack) {
+  const benchmark::PackOutcome o = outcome_of(2, 0, true);
+  EXPECT_EQ(o.verdict, "NO_MISMATCH");
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+}  // namespace
+}  // namespace bms
