@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace bms::workflow {
 
@@ -55,8 +56,10 @@ std::vector<RowRange> one_direction(const measurement::Recording& r) {
 std::vector<identification::SlowRun> runs_of(const measurement::Recording& r) {
   std::vector<identification::SlowRun> runs;
   for (const auto& [first, count] : one_direction(r)) {
-    runs.push_back({{r.time_s.part(first, count), r.current_a.part(first, count), r.voltage_v.part(first, count), 0},
-                    r.soc_ref.empty() ? measurement::Column{} : r.soc_ref.part(first, count)});
+    identification::SlowRun run;
+    run.data = {r.time_s.part(first, count), r.current_a.part(first, count), r.voltage_v.part(first, count), 0};
+    if (!r.soc_ref.empty()) run.soc = r.soc_ref.part(first, count);
+    runs.push_back(std::move(run));
   }
   return runs;
 }
