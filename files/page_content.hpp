@@ -27,8 +27,8 @@ struct PageChart {
   std::vector<double> time_s;
   std::vector<std::vector<double>> columns;         ///< NaN: no value
   std::vector<std::vector<double>> half_band = {};  ///< empty, or for each column half the width of a band; empty: none
-  std::vector<std::string> right = {};              ///< labels that belong to an axis of their own, on the right
   std::string x_title = {};                         ///< what time_s has instead of the time; empty: the time
+  std::vector<std::string> right = {};              ///< labels that belong to an axis of their own, on the right
 };
 
 struct PageContent {

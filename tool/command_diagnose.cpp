@@ -151,7 +151,7 @@ class DiagnoseCommand final : public Command {
     options.cell = pack_;
     options.recording = o_.recordings.front();
     if (!o_.initial_soc.empty()) options.initial_soc = o_.initial_soc.front();
-    options.progress = progress_on_terminal(0.1, progress_line);
+    options.progress = progress_on_stderr(0.1, progress_line);
     const workflow::PackResult result = workflow::diagnose_pack(options);
     print_read_as(output_, result.recording);
     for (const measurement::Warning& w : result.warnings) warn(w.text);
