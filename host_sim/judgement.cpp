@@ -53,6 +53,15 @@ std::size_t count(const std::vector<EstimateRow>& rows, std::uint32_t flags) {
       std::count_if(rows.begin(), rows.end(), [flags](const EstimateRow& e) { return (e.flags & flags) != 0; }));
 }
 
+/// The filter does not follow a charge that the cell cannot hold: it estimates the state of charge again. Two witnesses
+/// are enough: the voltages contradict the count, and the count moves more than the capacity.
+bool contradicts_the_count(const ReplayResult& result) {
+  const std::vector<measurement::Warning>& warnings = result.recording.warnings;
+  return count(result.track.rows, estimator::soc_contradicted | estimator::voltage_rejected) > 0 &&
+         std::any_of(warnings.begin(), warnings.end(),
+                     [](const measurement::Warning& w) { return w.id == "charge_exceeds_capacity"; });
+}
+
 std::vector<std::string> doubts_of(const ReplayResult& result) {
   std::vector<std::string> doubts;
   for (const measurement::Warning& w : result.recording.warnings) {
@@ -80,6 +89,9 @@ Judgement judge(const ReplayResult& result) {
     judgement.impossible =
         fmt::format("the state of charge leaves {:g} to {:g} % ({:.1f} % at the end); likely cause: {}",
                     100 * model::min_soc, 100 * model::max_soc, 100 * rows.back().soc, likely_cause(result));
+  } else if (contradicts_the_count(result)) {
+    judgement.impossible =
+        fmt::format("the voltages contradict the counted charge; likely cause: {}", likely_cause(result));
   }
   judgement.doubts = doubts_of(result);
   return judgement;
