@@ -1,5 +1,5 @@
 # bms_board_config(NAME FOLDER SOURCE TEXT [CELLS N] [SAMPLE_PERIOD_S S] [CURRENT_RANGE_A A] [FIXED_POINT true|false]
-#                  [DC_LINK true|false] [PRECHARGE_S S] [CLOSING_A A] [CLOSING_OHM OHM]
+#                  [DC_LINK true|false] [TRUCK_STATED true|false] [PRECHARGE_S S] [CLOSING_A A] [CLOSING_OHM OHM]
 #                  [VEHICLE_PROFILE none|cia418|j1939] [CANOPEN_NODE N] [CANOPEN_CHARGER N])
 #
 # Writes FOLDER/board_config.hpp: all that the C++ code knows about a board and about the build options. NAME becomes
@@ -10,14 +10,15 @@ function(bms_board_config name folder)
   set(bms_config_CURRENT_RANGE_A 2147)
   set(bms_config_FIXED_POINT false)
   set(bms_config_DC_LINK true)
+  set(bms_config_TRUCK_STATED false)
   set(bms_config_PRECHARGE_S 0.5)
   set(bms_config_CLOSING_A 600)
   set(bms_config_CLOSING_OHM 0.015)
   set(bms_config_VEHICLE_PROFILE none)
   set(bms_config_CANOPEN_NODE 1)
   set(bms_config_CANOPEN_CHARGER 10)
-  set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK PRECHARGE_S CLOSING_A CLOSING_OHM
-    VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER)
+  set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK TRUCK_STATED PRECHARGE_S
+    CLOSING_A CLOSING_OHM VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER)
   cmake_parse_arguments(arg "" "SOURCE;${settings}" "" ${ARGN})
   set(bms_config_source ${arg_SOURCE})
   foreach(setting ${settings})

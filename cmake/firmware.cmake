@@ -76,9 +76,13 @@ endif()
 if(NOT DEFINED BMS_DC_LINK)
   set(BMS_DC_LINK true)
 endif()
+set(truck_stated false)
+if(DEFINED BMS_PRECHARGE_S OR DEFINED BMS_CLOSING_A OR DEFINED BMS_CLOSING_OHM)
+  set(truck_stated true)
+endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
   ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
-  FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK}
+  FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.

@@ -19,7 +19,8 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
-  static_assert(possible_truck(board_pack), "BMS_PRECHARGE_S, BMS_CLOSING_A or BMS_CLOSING_OHM is out of range");
+  static_assert(!hal::truck_stated || possible_truck(board_pack),
+                "BMS_PRECHARGE_S, BMS_CLOSING_A or BMS_CLOSING_OHM is out of range");
   static_assert(protection::current_sensor_suffices(board_pack),
                 "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
   static constexpr auto plan = protection::protection_plan(board_pack);
