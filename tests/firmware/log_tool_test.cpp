@@ -43,8 +43,8 @@ class LogTool : public ::testing::Test {
  protected:
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
   std::vector<std::string> command() const {
-    return {BMS_TOOL, "log",           std::string("slcan:") + line_.name(), "--out", path("faults.csv"),
-            "--json", path("log.json")};
+    return {"/usr/bin/env", "BMS_PROGRESS=off", BMS_TOOL, "log",           std::string("slcan:") + line_.name(),
+            "--out",        path("faults.csv"), "--json", path("log.json")};
   }
   static std::filesystem::path image() {
     return images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
