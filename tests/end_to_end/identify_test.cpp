@@ -203,7 +203,9 @@ TEST_F(IdentifyTool, SeveralTemperaturesGiveOneTableEach) {
   ASSERT_EQ(r0_ohm.size(), 3U);
   EXPECT_GT(r0_ohm[5], r0_ohm[25]) << "cold cells resist";
   EXPECT_GT(r0_ohm[25], r0_ohm[45]);
-  EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("cell.toml")).exit_code, 0);
+  EXPECT_EQ(run_tool("replay " + real("dyn20_P25_A002.csv") + " --cell " + path("cell.toml")).exit_code, 0);
+  EXPECT_THAT(run_tool("replay " + shift + " --cell " + path("cell.toml")).err, HasSubstr("the cell has 2.5"))
+      << "not 6";
 }
 
 /// Simulates table9, whose resistances follow the temperature, for an hour and a half of pulses.
