@@ -61,6 +61,12 @@ constexpr bool is_of_data(Cause cause) {
   return cause == Cause::late || cause == Cause::repeated || cause == Cause::staggered || cause == Cause::missing;
 }
 
+/// Returns true for two causes of one cell whose effects are nearly alike. Together they would cancel at any size.
+constexpr bool are_alike(Cause a, Cause b) {
+  return (a == Cause::offset && b == Cause::gain) || (a == Cause::gain && b == Cause::offset) ||
+         (a == Cause::resistance && b == Cause::joint) || (a == Cause::joint && b == Cause::resistance);
+}
+
 /// The parameter of a cell that a cause changes. A sense wire changes the offsets of two neighbours in opposite ways.
 constexpr Parameter parameter_of(Cause cause) {
   switch (cause) {

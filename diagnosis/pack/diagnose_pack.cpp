@@ -183,7 +183,11 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
     if (std::find(others.begin(), others.end(), rival) != others.end()) continue;
     std::vector<Accusation> instead = others;
     instead.push_back(rival);
-    const double odds = std::exp(likelihood.gain(others, rival, now) - f.gain);
+    double odds = std::exp(likelihood.gain(others, rival, now) - f.gain);
+    // the data want both of two that are alike: which one it is cannot be said
+    if (rival.cell == a.cell && are_alike(a.cause, rival.cause) &&
+        likelihood.gain(s.accused, rival, now) >= likelihood.least_gain())
+      odds = std::max(odds, 1.0);
     if (!likelihood.is_possible(rival, likelihood.size(instead, rival, now))) continue;
     sum += odds;
     f.rivals.push_back({rival.cause, rival.cell, odds});

@@ -26,12 +26,6 @@ bool only_positive(Cause cause) {
   return cause == Cause::capacity || cause == Cause::leakage || cause == Cause::resistance || cause == Cause::joint;
 }
 
-/// Two causes of one cell whose effects are nearly alike. Together they would cancel at any size.
-bool are_alike(const Accusation& a, const Accusation& b) {
-  const auto both = [&](Cause x, Cause y) { return (a.cause == x && b.cause == y) || (a.cause == y && b.cause == x); };
-  return a.cell == b.cell && (both(Cause::offset, Cause::gain) || both(Cause::resistance, Cause::joint));
-}
-
 /// Without one of them.
 std::vector<Accusation> without(std::vector<Accusation> list, const Accusation& one) {
   std::erase(list, one);
@@ -247,7 +241,8 @@ std::vector<Accusation> select(const PackLikelihood& likelihood, const std::vect
     return std::find(certain.begin(), certain.end(), a) != certain.end();
   };
   const auto possible = [&](const std::vector<Accusation>& others, const Accusation& a) {
-    if (std::any_of(others.begin(), others.end(), [&](const Accusation& o) { return are_alike(o, a); })) return false;
+    const auto alike = [&](const Accusation& o) { return o.cell == a.cell && are_alike(o.cause, a.cause); };
+    if (std::any_of(others.begin(), others.end(), alike)) return false;
     return likelihood.is_possible(a, likelihood.size(with(others, a), a, now));
   };
   const auto exchange = [&] {
