@@ -9,8 +9,8 @@
 #include <Eigen/Dense>
 
 #include "experiments/experiment.hpp"
+#include "measurement/in_parallel.hpp"
 #include "study/observations.hpp"
-#include "study/parallel.hpp"
 #include "study/table_cells.hpp"
 
 namespace bms::study {
@@ -152,7 +152,8 @@ std::array<double, wanted> spread_on_plant(const std::vector<double>& current_a)
   bench.start_branch = -1;
   bench.current_noise_a = 0;
   std::vector<Eigen::VectorXd> found(seeds);
-  in_parallel(seeds, [&](std::size_t k) { found[k] = identified(run_currents("", current_a, soc, bench, 1 + k)); });
+  measurement::in_parallel(
+      seeds, [&](std::size_t k) { found[k] = identified(run_currents("", current_a, soc, bench, 1 + k)); });
   std::array<double, wanted> spread{};
   for (std::size_t p = 0; p < wanted; ++p) {
     double mean = 0, squares = 0;

@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
+#include "measurement/in_parallel.hpp"
 #include "study/paper_fit.hpp"
-#include "study/parallel.hpp"
 
 namespace bms::study {
 
@@ -143,7 +143,7 @@ std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Eff
   const PaperFit fit(cell, effects);
   const std::vector<Split> splits = splits_of(fit.published());
   std::vector<HeldOut> out(splits.size());
-  in_parallel(splits.size(), [&](std::size_t k) { out[k] = held_out(fit, fit.start(), splits[k]); });
+  measurement::in_parallel(splits.size(), [&](std::size_t k) { out[k] = held_out(fit, fit.start(), splits[k]); });
   return out;
 }
 
@@ -211,7 +211,7 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell) {
   const auto begin = Clock::now();
   constexpr std::size_t count = 8;
   std::vector<Fitted> all(count);
-  in_parallel(count, [&](std::size_t k) {
+  measurement::in_parallel(count, [&](std::size_t k) {
     const std::size_t bits = count - 1 - k;  // the candidates with most unknowns first
     all[k] = fitted(cell, {(bits & 1U) != 0, (bits & 2U) != 0, (bits & 4U) != 0});
   });

@@ -12,25 +12,6 @@ namespace {
 constexpr double pulse_start_soc = 0.41;
 constexpr int paper_ocv_steps = 10, fine_ocv_steps = 40;
 
-/// Smaller cost of the grey box's states: the circuit stays.
-id::LeastSquares states_only(const id::GreyBox& grey_box, const Eigen::VectorXd& start, Eigen::Index first) {
-  const id::LeastSquares whole = grey_box.problem();
-  id::LeastSquares p;
-  const Eigen::Index n = start.size() - first;
-  p.lower = whole.lower.tail(n);
-  p.upper = whole.upper.tail(n);
-  p.scale = whole.scale.tail(n);
-  p.evaluate = [whole, start, n](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    Eigen::VectorXd all = start;
-    all.tail(n) = x;
-    Eigen::MatrixXd of_all;
-    if (!whole.evaluate(all, r, jacobian != nullptr ? &of_all : nullptr)) return false;
-    if (jacobian != nullptr) *jacobian = of_all.rightCols(n);
-    return true;
-  };
-  return p;
-}
-
 OcvObservation observe_ocv(const std::vector<id::RestedVoltage>& rests) {
   const id::OcvPoints all = points_of(rests, id::OcvDirection::discharge);
   // look-up and pieces have entries at every second and every fourth rest; the rests between them judge
@@ -130,7 +111,7 @@ InitialStates initial_states(const model::CellParameters<>& cell, const StudyDat
   const id::GreyBox grey_box(cell, {set}, options);
   Eigen::VectorXd start = grey_box.start();
   start.head(3) = Eigen::Vector3d{circuit.r0_ohm, circuit.r1_ohm, circuit.c1_f};
-  const id::LeastSquares problem = states_only(grey_box, start, 3);
+  const id::LeastSquares problem = id::with_first_fixed(grey_box.problem(), start, 3);
   const id::Optimum found = minimise(problem, start.tail(2), id::Method::trust_region_reflective);
   Eigen::VectorXd all = start, simulated(static_cast<Eigen::Index>(part.data.size()));
   all.tail(2) = found.x;

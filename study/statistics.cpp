@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "files/cell_file.hpp"
-#include "study/parallel.hpp"
+#include "measurement/in_parallel.hpp"
 #include "study/table_cells.hpp"
 
 namespace bms::study {
@@ -129,7 +129,7 @@ void add_statistics(const model::CellParameters<>& cell, std::size_t seeds, std:
   // the simulated cells are the paper's, whatever cell the recordings are of
   const model::CellParameters<> paper_cell = files::read_cell("table9").parameters;
   std::vector<std::vector<Observations>> runs(names.size(), std::vector<Observations>(seeds));
-  in_parallel(names.size() * seeds, [&](std::size_t k) {
+  measurement::in_parallel(names.size() * seeds, [&](std::size_t k) {
     const std::size_t plant = k / seeds;
     const std::uint64_t seed = first_seed + k % seeds;
     constexpr std::uint64_t noise_seed = 1'000;

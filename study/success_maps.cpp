@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "study/parallel.hpp"
+#include "measurement/in_parallel.hpp"
 #include "study/statistics.hpp"
 #include "study/table_cells.hpp"
 #include "workflow/identification_data.hpp"
@@ -89,7 +89,7 @@ void add_success_maps(const model::CellParameters<>& cell, std::uint64_t seed, S
   given.ocv = id::even_pieces(points_of(id::rested_voltages(test.data, 1), id::OcvDirection::discharge));
   const StudyData part = window(test, "80 to 50 %", 0.8, 0.5);
   Maps maps;
-  in_parallel(models * starts, [&](std::size_t k) {
+  measurement::in_parallel(models * starts, [&](std::size_t k) {
     for (std::size_t m = 0; m < methods.size(); ++m)
       maps.at(k / starts, k % starts, m) = fit_from(given, part, k / starts, k % starts, m);
   });
