@@ -317,6 +317,25 @@ Optimum minimise(const LeastSquares& problem, const VectorXd& start, Method meth
   return run.result();
 }
 
+LeastSquares with_first_fixed(const LeastSquares& whole, const Eigen::VectorXd& start, Eigen::Index first) {
+  LeastSquares p;
+  const Eigen::Index n = start.size() - first;
+  const auto others = [n](const Eigen::VectorXd& v) { return Eigen::VectorXd(v.tail(std::min(n, v.size()))); };
+  p.lower = others(whole.lower);
+  p.upper = others(whole.upper);
+  p.scale = others(whole.scale);
+  p.evaluate = [evaluate = whole.evaluate, start, n](const Eigen::VectorXd& x, Eigen::VectorXd& r,
+                                                     Eigen::MatrixXd* jacobian) {
+    Eigen::VectorXd all = start;
+    all.tail(n) = x;
+    Eigen::MatrixXd of_all;
+    if (!evaluate(all, r, jacobian != nullptr ? &of_all : nullptr)) return false;
+    if (jacobian != nullptr) *jacobian = of_all.rightCols(n);
+    return true;
+  };
+  return p;
+}
+
 const char* name_of(Method method) {
   switch (method) {
     case Method::subspace_gauss_newton:

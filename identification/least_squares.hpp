@@ -50,6 +50,9 @@ struct Optimum {
 Optimum minimise(const LeastSquares& problem, const Eigen::VectorXd& start, Method method,
                  const Stopping& stopping = {});
 
+/// The problem with its first unknowns fixed at `start`, for the others.
+LeastSquares with_first_fixed(const LeastSquares& whole, const Eigen::VectorXd& start, Eigen::Index first);
+
 /// gn, agn, lm, sd, nls.
 const char* name_of(Method method);
 

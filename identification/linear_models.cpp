@@ -93,22 +93,6 @@ Searched search_linear(LinearKind kind, const model::CellParameters<>& cell, con
   return s;
 }
 
-/// The problem with the linear block fixed.
-LeastSquares curves_only(const LeastSquares& whole, const Eigen::VectorXd& start, Eigen::Index linear) {
-  LeastSquares p;
-  const Eigen::Index n = start.size() - linear;
-  p.scale = whole.scale.tail(n);
-  p.evaluate = [&whole, start, n](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    Eigen::VectorXd all = start;
-    all.tail(n) = x;
-    Eigen::MatrixXd of_all;
-    if (!whole.evaluate(all, r, jacobian != nullptr ? &of_all : nullptr)) return false;
-    if (jacobian != nullptr) *jacobian = of_all.rightCols(n);
-    return true;
-  };
-  return p;
-}
-
 /// Everything at once, and after the curves alone; the better of both ends.
 Searched search_curves(const Searched& linear, const model::CellParameters<>& cell, const Data& data, double soc,
                        Method method, const Stopping& stopping) {
@@ -118,8 +102,9 @@ Searched search_curves(const Searched& linear, const model::CellParameters<>& ce
   Eigen::VectorXd x = to_unknowns(s.blocks);
   const auto first = static_cast<Eigen::Index>(s.blocks.structure.unknowns());
   s.found = minimise(s.problem, x, method, stopping);
-  x.tail(x.size() - first) =
-      minimise(curves_only(s.problem, x, first), x.tail(x.size() - first), Method::trust_region_reflective, stopping).x;
+  x.tail(x.size() - first) = minimise(with_first_fixed(s.problem, x, first), x.tail(x.size() - first),
+                                      Method::trust_region_reflective, stopping)
+                                 .x;
   Optimum staged = minimise(s.problem, x, method, stopping);
   if (staged.cost < s.found.cost) s.found = std::move(staged);
   s.blocks = with_unknowns(s.blocks, s.found.x);

@@ -100,17 +100,24 @@ TEST(GreyBox, TheOcvBranchPositionMovesTheCurveByItsHalfGap) {
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) EXPECT_NEAR(back.ocv.b0_v[k], cell.ocv.b0_v[k], 1e-12);
 }
 
-TEST(GreyBox, TheOcvBranchPositionIsLimitedToThoseAtWhichTheCurveRises) {
+/// Identifies one circuit and the position of the OCV between its branches; half_gap_v: at the first edge of the curve,
+/// 20 mV at the others.
+GreyBox box_with_branch(double half_gap_v) {
   model::CellParameters<> cell = table9();
   for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02);
-  // near empty slow charge lies far above slow discharge: towards it the curve would fall
-  cell.ocv.half_gap_v[0] = 0.02 + 2 * cell.ocv.b1_v[0] * (cell.ocv.soc[1] - cell.ocv.soc[0]);
+  cell.ocv.half_gap_v[0] = half_gap_v;
   GreyBoxOptions options;
   options.soc_nodes = {0.5};
   options.estimate_ocv_branch = true;
   DataSet record;
   record.data = irregular(20);
-  const GreyBox grey_box(cell, {record}, options);
+  return GreyBox(cell, {record}, options);
+}
+
+TEST(GreyBox, TheOcvBranchPositionIsLimitedToThoseAtWhichTheCurveRises) {
+  const model::OcvTable<double> ocv = table9().ocv;
+  // near empty slow charge lies far above slow discharge: towards it the curve would fall
+  const GreyBox grey_box = box_with_branch(0.02 + 2 * ocv.b1_v[0] * (ocv.soc[1] - ocv.soc[0]));
   const LeastSquares problem = grey_box.problem();
   Eigen::VectorXd x = grey_box.start();
   EXPECT_NEAR(problem.upper[3], 0.5, 0.01);
@@ -123,16 +130,9 @@ TEST(GreyBox, TheOcvBranchPositionIsLimitedToThoseAtWhichTheCurveRises) {
 }
 
 TEST(GreyBox, TheOcvBranchPositionIsLimitedToSlopesThatACellFileMayState) {
-  model::CellParameters<> cell = table9();
-  for (std::size_t k = 0; k < cell.ocv.soc.size; ++k) cell.ocv.half_gap_v.push_back(0.02);
+  const model::OcvTable<double> ocv = table9().ocv;
   // near empty slow charge rises by 100 V per unit of soc more than slow discharge
-  cell.ocv.half_gap_v[0] = 0.02 - 50 * (cell.ocv.soc[1] - cell.ocv.soc[0]);
-  GreyBoxOptions options;
-  options.soc_nodes = {0.5};
-  options.estimate_ocv_branch = true;
-  DataSet record;
-  record.data = irregular(20);
-  const GreyBox grey_box(cell, {record}, options);
+  const GreyBox grey_box = box_with_branch(0.02 - 50 * (ocv.soc[1] - ocv.soc[0]));
   const LeastSquares problem = grey_box.problem();
   Eigen::VectorXd x = grey_box.start();
   for (const double position : {problem.lower[3], problem.upper[3]}) {
