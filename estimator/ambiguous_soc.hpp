@@ -100,6 +100,8 @@ class AmbiguousSoc {
     const auto result = bank_.step(soc, constants.bank_share(), cell.noise.voltage_v2,
                                    Variance(cell.noise.model_v2 + lasting_v2), observation);
     if (!result.ready) return BankEvent::none;
+    deviation_v2_ = Variance(
+        deviation_v2_ - arithmetic::product<Variance>(deviation_v2_, SocBank<S>::decay_in(constants.bank_share())));
     const Soc moved = Soc(soc + result.moved);
     if (in_background_ && !(bank_.misfit_at(soc, moved) > arithmetic::Current<S>(replaces_above))) {
       close_if_decided(soc, moved);

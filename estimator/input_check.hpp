@@ -8,7 +8,7 @@
 //   gap           a time step more than `gap_factor` times the usual one
 //
 // A current that fails is replaced by the last accepted one. Its uncertainty is then current_unknown_a of the cell
-// file. An implausible current that lasts is used, with a flag of its own.
+// file. An implausible current that lasts is used, with a flag of its own, unless no such cell could carry it.
 //
 // Current and voltage are checked in two calls, the voltage after the prediction: the check for a stuck voltage needs
 // the model's drop. Checking all of a sample at once before the prediction costs 18 instructions a step.
@@ -50,7 +50,7 @@ class InputCheck {
       beyond_ = 0;
       current_ua_ = beyond;
     }
-    if (lasts_beyond_limits(current_ua)) {
+    if (lasts_beyond_limits(current_ua, plausible.current_possible_ua)) {
       flags |= current_beyond_limits;
       accepted_ua_ = current_ua;
       return {current_ua, true};
@@ -111,8 +111,8 @@ class InputCheck {
 
  private:
   /// Counts readings beyond the plausible range: up for a charge, down for a discharge.
-  [[gnu::noinline]] constexpr bool lasts_beyond_limits(std::int32_t current_ua) {
-    if (current_ua == measurement::no_reading) {
+  [[gnu::noinline]] constexpr bool lasts_beyond_limits(std::int32_t current_ua, std::int32_t possible_ua) {
+    if (!within(current_ua, -possible_ua, possible_ua)) {  // so is a missing one
       beyond_ = 0;
       return false;
     }

@@ -156,16 +156,17 @@ class SocBank {
                      : sum;
   }
 
+  /// Part of a persistent error that passes in one turn. share: as in step().
+  static constexpr Fraction decay_in(const Fraction& share) {
+    return share * Fraction(1.0 / model::persistent_error_correlations);
+  }
+
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
 
  private:
   static constexpr int most = 4;  ///< largest increase of a misfit by one voltage
 
   static constexpr Misfit clamped(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
-
-  static constexpr Fraction decay_in(const Fraction& share) {
-    return share * Fraction(1.0 / model::persistent_error_correlations);
-  }
 
   /// Part of off_v outside of +-half_v.
   static constexpr Voltage beyond(const Voltage& off_v, const Voltage& half_v) {

@@ -247,7 +247,7 @@ class SocEstimator {
                                                           Temperature temperature_c, Soc soc, Voltage above_ocv_v,
                                                           Voltage innovation_v, bool measured) {
     monitor_.watch(cell, constants_, state_, time_us_, above_ocv_v, innovation_v, measured);
-    if (!monitor_.has_to_judge(innovation_v)) return 0;
+    if (!monitor_.has_to_judge(soc, innovation_v)) return 0;
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
     const std::uint32_t found = monitor_.judge(cell, input, constants_, soc, innovation_v,
                                                monitor_.overpotential_v2(above_ocv_v, state_), interval_, state_);

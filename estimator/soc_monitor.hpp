@@ -1,6 +1,6 @@
 // Finds out when the voltages contradict the state of charge: single voltages that are outliers (outlier_gate.hpp), a
-// mean over half an hour that is inconsistent (consistency.hpp), or a bank of hypotheses that prefers another SOC
-// (ambiguous_soc.hpp). Then the bank estimates the SOC again, with a wider sigma.
+// mean over half an hour that is inconsistent (consistency.hpp), a SOC that no cell can have, or a bank of hypotheses
+// that prefers another SOC (ambiguous_soc.hpp). Then the bank estimates the SOC again, with a wider sigma.
 //
 // An ordinary step only compares its innovation with a limit (is_due).
 #pragma once
@@ -39,6 +39,9 @@ class SocMonitor {
   /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
   static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
 
+  /// How far outside of 0 to 1 a SOC can get by an error of the capacity alone.
+  static constexpr double capacity_may_be_off = 0.05;
+
   template <class Cell>
   constexpr void start(const Cell& cell) {
     reading_noise_v2_ = cell.noise.voltage_v2;
@@ -65,8 +68,9 @@ class SocMonitor {
                                                                                        constants.resistance_noise()));
   }
 
-  constexpr bool has_to_judge(const Voltage& innovation_v) const {
-    return bank_.open() || consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v);
+  constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {
+    return bank_.open() || consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v) ||
+           beyond_range(soc) > Soc(0);
   }
   /// Square of the overpotential as its error counts.
   constexpr Variance overpotential_v2(const Voltage& above_ocv_v, const State& state) const {
@@ -84,7 +88,8 @@ class SocMonitor {
     if (bank_.open() &&
         correct_from_bank(cell, input, constants, soc, innovation_v, of_resistances_v2, interval, state))
       return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};
-    if (!consistency_.is_suspect() && !OutlierGate<S>::is_suspect(innovation_v)) return 0;
+    if (!consistency_.is_suspect() && !OutlierGate<S>::is_suspect(innovation_v) && !(beyond_range(soc) > Soc(0)))
+      return 0;
     return judge_deviation(cell, input, soc, innovation_v, of_resistances_v2, interval, state);
   }
 
@@ -92,6 +97,10 @@ class SocMonitor {
   constexpr void follow(const Soc& by) { bank_.follow(by); }
 
  private:
+  /// By how much a SOC is outside of what a cell can have; else <= 0.
+  static constexpr Soc beyond_range(const Soc& soc) {
+    return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + capacity_may_be_off));
+  }
   /// Flags of an outlier, or of a voltage that shows that the state is inconsistent; else 0.
   template <class Cell>
   constexpr std::uint32_t judge_deviation(const Cell& cell, const StepInput& input, const Soc& soc,
@@ -109,7 +118,12 @@ class SocMonitor {
                  Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state, h) + of_resistances_v2));
     const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
     const bool judged_by_bank = bank_.open() && !bank_.in_background();
-    if (consistency_.is_inconsistent(expected_v2, share_) && !judged_by_bank) {
+    const Soc beyond = beyond_range(soc);
+    const bool impossible =
+        beyond > Soc(0) &&
+        Variance(beyond * beyond) >
+            arithmetic::product<Variance>(variance, Count(Consistency<S>::max_sigmas * Consistency<S>::max_sigmas));
+    if ((consistency_.is_inconsistent(expected_v2, share_) || impossible) && !judged_by_bank) {
       estimate_again(cell, soc, variance, of_model_v2, state);
       return soc_ambiguous | soc_contradicted;
     }

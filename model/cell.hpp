@@ -60,7 +60,8 @@ struct ChargeScale {
 /// A reading outside this range is not a measurement.
 struct PlausibleRange {
   std::int32_t voltage_min_uv = 0, voltage_max_uv = 0;
-  std::int32_t current_max_ua = 0;  ///< either way
+  std::int32_t current_max_ua = 0;       ///< either way
+  std::int32_t current_possible_ua = 0;  ///< either way; beyond it, no cell with these resistances keeps its voltage
 };
 
 /// Limits of use, and the SOC per charge.
@@ -249,7 +250,9 @@ constexpr ChargeScale<S> charge_scale(double capacity_as) {
   return c;
 }
 
-constexpr PlausibleRange plausible_range(const Limits& l) {
+template <class Real>
+constexpr PlausibleRange plausible_range(const CellParameters<Real>& p) {
+  const Limits& l = p.limits;
   PlausibleRange r;
   // half a volt and ten times the current beyond the limits of use: a reading there can still be right
   r.voltage_min_uv = static_cast<std::int32_t>((l.voltage_min_v - 0.5) * 1e6);
@@ -257,6 +260,11 @@ constexpr PlausibleRange plausible_range(const Limits& l) {
   const double larger =
       l.charge_current_max_a > l.discharge_current_max_a ? l.charge_current_max_a : l.discharge_current_max_a;
   r.current_max_ua = micro_a(10 * larger);
+  double least_r0_ohm = plain(p.rc.r0_ohm[0]);
+  for (std::size_t k = 1; k < p.rc.r0_ohm.size; ++k)
+    least_r0_ohm = plain(p.rc.r0_ohm[k]) < least_r0_ohm ? plain(p.rc.r0_ohm[k]) : least_r0_ohm;
+  // twice the whole range of voltages over R0, which is smaller in the heat
+  r.current_possible_ua = micro_a(2e-6 * (r.voltage_max_uv - r.voltage_min_uv) / least_r0_ohm);
   return r;
 }
 
@@ -289,7 +297,7 @@ constexpr Cell<S, Max> prepare(const CellParameters<Real>& p) {
   cell.limits = {Voltage<S>(p.limits.voltage_min_v), Voltage<S>(p.limits.voltage_max_v),
                  Current<S>(p.limits.charge_current_max_a), Current<S>(p.limits.discharge_current_max_a),
                  Fraction<S>(1 / capacity_as)};
-  cell.plausible = d::plausible_range(p.limits);
+  cell.plausible = d::plausible_range(p);
   cell.reference = ReferenceTemperature<S>::of(p.reference_temperature_c);
   return cell;
 }

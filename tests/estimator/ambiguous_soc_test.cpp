@@ -54,6 +54,18 @@ TEST(AmbiguousSoc, StaysOpenOnThePlateau) {
   EXPECT_GT(std::sqrt(r.state.soc_variance()), SocBank<double>::close_below_sigma);
 }
 
+/// Samples that no sensor should give leave a mean deviation of volts.
+TEST(AmbiguousSoc, ALargeDeviationFromBeforeIsForgotten) {
+  Restart r(0.5);
+  const SocDistribution<double> before{0.5, 0.3 * 0.3};
+  r.ambiguous.open_at(0.5, StartMisfit<double, decltype(r.cell)>{r.cell, nullptr, 0, 0, &before}, false, 100);
+  for (int k = 0; k < 1'800; ++k) r.second(0.05);
+  EXPECT_TRUE(r.ambiguous.open());
+  for (int k = 0; k < 4 * 3'600 && r.ambiguous.open(); ++k) r.second(0.05);
+  EXPECT_FALSE(r.ambiguous.open());
+  EXPECT_NEAR(r.state.charge.soc(r.cell.charge), 0.05, 0.02);
+}
+
 TEST(AmbiguousSoc, TheModelsErrorAndTheStatesThatAreNotCorrectedPersist) {
   const Restart r(0.5);
   EXPECT_DOUBLE_EQ((AmbiguousSoc<double, Model>::persistent_variance(r.cell.noise, r.state, {2, 1})),

@@ -5,8 +5,10 @@
 namespace bms::estimator {
 namespace {
 
-constexpr model::PlausibleRange plausible{
-    .voltage_min_uv = 1'500'000, .voltage_max_uv = 4'100'000, .current_max_ua = 60'000'000};
+constexpr model::PlausibleRange plausible{.voltage_min_uv = 1'500'000,
+                                          .voltage_max_uv = 4'100'000,
+                                          .current_max_ua = 60'000'000,
+                                          .current_possible_ua = 500'000'000};
 
 TEST(InputCheck, ReplacesAnImplausibleCurrentByTheLastAcceptedOne) {
   InputCheck<float> check;
@@ -30,6 +32,15 @@ TEST(InputCheck, UsesACurrentBeyondTheLimitsThatLastsAndFlagsIt) {
     EXPECT_EQ(a.measured, k >= 5);
     EXPECT_EQ(flags, k >= 5 ? current_beyond_limits : current_implausible);
     EXPECT_EQ(a.ua, k >= 5 ? -90'000'000 + k : 0);
+  }
+}
+
+TEST(InputCheck, NeverUsesACurrentThatNoSuchCellCouldCarry) {
+  InputCheck<float> check;
+  for (int k = 1; k <= 20; ++k) {
+    std::uint32_t flags = 0;
+    EXPECT_FALSE(check.current(-500'000'001 - k, plausible, flags).measured);
+    EXPECT_EQ(flags, current_implausible);
   }
 }
 
