@@ -232,9 +232,10 @@ void reject_if_fpu_needed(const CellFile& file) {
                       table_of(info)));
   }
   if (!model::fits_fixed_point(file.parameters, acting))
-    throw BadInput(file.path, 1,
-                   "rc.c1_f is above 100000 F, or the mechanisms make a resistance too large or too small for fixed "
-                   "point, expected arithmetic in float");
+    throw BadInput(
+        file.path, 1,
+        "rc.c1_f is above 100000 F, or the mechanisms make a resistance or an activation energy too large or "
+        "too small for fixed point, expected arithmetic in float");
 }
 
 namespace {

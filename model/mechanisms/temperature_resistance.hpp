@@ -35,6 +35,19 @@ struct TemperatureResistance {
       Parameter{"slow_ratio", "1", Role::given, 1, 0, 10, Per::cell, "energy of fast and slow polarisation over E_1"},
   };
 
+  /// No energy, and no difference of two that are next to each other, is beyond the range of Factor.
+  static constexpr bool fits_fixed_point(const std::array<double, max_mechanism_parameters>& p, double) {
+    constexpr auto most = static_cast<double>(Factor<FixedPoint>::highest());
+    bool fits = true;
+    for (const double slow_ratio : {1.0, p[7]}) {
+      const double e = mechanism_detail::energy_over_rt(p[1] * slow_ratio, p[2]);
+      const std::array<double, 4> at = {e * (1 + p[4]), e * (1 + p[5]), e, e * (1 + p[6])};
+      for (std::size_t k = 0; k < at.size(); ++k)
+        fits = fits && at[k] < most && (k == 0 || magnitude(at[k] - at[k - 1]) < most);
+    }
+    return fits;
+  }
+
   template <class S>
   struct Law {
     static constexpr LawMembers members = law_member::tables | law_member::resistances_follow_temperature;

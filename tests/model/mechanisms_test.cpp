@@ -471,5 +471,41 @@ TEST(TemperatureResistance, LeavesTheShareOfContactsAndFoilsAlone) {
   }
 }
 
+/// Resistance R1 of 2 mohm by the law.
+template <class S>
+double r1_ohm(const std::array<double, 8>& p, double soc, double c) {
+  const TemperatureResistance::Law<S> law(p, capacity_ah);
+  TablePoint<S> at{};
+  at.r0_ohm = at.r1_ohm = Resistance<S>(0.002);
+  at.per_width = PerSoc<S>(1.0);
+  law.tables(at, Soc<S>(soc), {Current<S>(1), TimeStep<S>(1), Temperature<S>(c)});
+  return as_double(at.r1_ohm);
+}
+
+/// An energy that saturates between two nodes would make R1 a hundred times too large there.
+TEST(TemperatureResistance, FixedPointRefusesEnergiesThatItCannotHold) {
+  int refused = 0;
+  for (const double energy : {30'000.0, 60'000.0, 90'000.0}) {
+    for (const double more : {-1.0, 0.0, 1.3, 4.0}) {
+      for (const double reference_c : {-30.0, 25.0}) {
+        const std::array<double, 8> p{20'000, energy, reference_c, 1, more, more, 0, 1};
+        std::array<double, max_mechanism_parameters> values{};
+        std::copy(p.begin(), p.end(), values.begin());
+        const bool fits = TemperatureResistance::fits_fixed_point(values, capacity_ah);
+        refused += fits ? 0 : 1;
+        if (!fits) continue;
+        for (const double c : {-20.0, 10.0, 40.0}) {
+          for (double soc = 0.05; soc < 1; soc += 0.05) {
+            const double exact = r1_ohm<double>(p, soc, c);
+            EXPECT_NEAR(r1_ohm<FixedPoint>(p, soc, c), exact, 0.01 * exact + 1e-6)
+                << energy << " " << more << " " << soc;
+          }
+        }
+      }
+    }
+  }
+  EXPECT_EQ(refused, 3) << "60 kJ/mol five times at -30 degrees C, 90 kJ/mol five times";
+}
+
 }  // namespace
 }  // namespace bms::model
