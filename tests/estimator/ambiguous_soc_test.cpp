@@ -55,7 +55,7 @@ TEST(AmbiguousSoc, StaysOpenOnThePlateau) {
 }
 
 /// Samples that no sensor should give leave a mean deviation of volts.
-TEST(AmbiguousSoc, ALargeDeviationFromBeforeIsForgotten) {
+TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
   Restart r(0.5);
   const SocDistribution<double> before{0.5, 0.3 * 0.3};
   r.ambiguous.open_at(0.5, StartMisfit<double, decltype(r.cell)>{r.cell, nullptr, 0, 0, &before}, false, 100);
