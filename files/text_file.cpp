@@ -87,12 +87,23 @@ std::filesystem::path target_of(const std::filesystem::path& wanted) {
   return target;
 }
 
-std::vector<unsigned char> sha256_bytes(std::string_view content) {
-  std::vector<unsigned char> digest(EVP_MAX_MD_SIZE);
-  unsigned int length = 0;
-  EVP_Digest(content.data(), content.size(), digest.data(), &length, EVP_sha256(), nullptr);
-  digest.resize(length);
+constexpr std::size_t sha256_length = 32;
+using Digest = std::array<unsigned char, sha256_length>;
+
+Digest sha256_bytes(std::string_view content) {
+  Digest digest{};
+  EVP_Digest(content.data(), content.size(), digest.data(), nullptr, EVP_sha256(), nullptr);
   return digest;
+}
+
+std::string hex_of(const Digest& digest) {
+  std::string hex;
+  for (const unsigned char byte : digest) {
+    constexpr char digits[] = "0123456789abcdef";
+    hex += digits[byte >> 4];
+    hex += digits[byte & 15];
+  }
+  return hex;
 }
 
 }  // namespace
@@ -141,18 +152,28 @@ void write_file(const std::filesystem::path& wanted, const std::function<void(co
   file.rename();
 }
 
-std::string sha256(std::string_view content) {
-  std::string hex;
-  for (const unsigned char byte : sha256_bytes(content)) {
-    constexpr char digits[] = "0123456789abcdef";
-    hex += digits[byte >> 4];
-    hex += digits[byte & 15];
-  }
-  return hex;
+struct Sha256::Context {
+  EVP_MD_CTX* of = EVP_MD_CTX_new();
+  Context() { EVP_DigestInit_ex(of, EVP_sha256(), nullptr); }
+  ~Context() { EVP_MD_CTX_free(of); }
+  Context(const Context&) = delete;
+  Context& operator=(const Context&) = delete;
+};
+
+Sha256::Sha256() : context_(std::make_shared<Context>()) {}
+
+void Sha256::add(std::string_view piece) { EVP_DigestUpdate(context_->of, piece.data(), piece.size()); }
+
+std::string Sha256::hex() {
+  Digest digest{};
+  EVP_DigestFinal_ex(context_->of, digest.data(), nullptr);
+  return hex_of(digest);
 }
 
+std::string sha256(std::string_view content) { return hex_of(sha256_bytes(content)); }
+
 std::string sha256_base64(std::string_view content) {
-  const std::vector<unsigned char> digest = sha256_bytes(content);
+  const Digest digest = sha256_bytes(content);
   std::array<unsigned char, 64> text{};  // 32 bytes become 44 characters
   const int length = EVP_EncodeBlock(text.data(), digest.data(), static_cast<int>(digest.size()));
   return {text.begin(), text.begin() + length};

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <string>
 #include <string_view>
 
@@ -26,6 +27,18 @@ void write_file(const std::filesystem::path& path, std::string_view content);
 using Sink = std::function<void(std::string_view piece)>;
 /// The same for a content that is produced piece by piece and need not fit into memory.
 void write_file(const std::filesystem::path& path, const std::function<void(const Sink&)>& produce);
+
+/// SHA-256 of a content that comes piece by piece.
+class Sha256 {
+ public:
+  Sha256();
+  void add(std::string_view piece);
+  std::string hex();  ///< of all pieces, in lower case; ends the calculation
+
+ private:
+  struct Context;
+  std::shared_ptr<Context> context_;
+};
 
 /// SHA-256 in lower-case hexadecimal.
 std::string sha256(std::string_view content);

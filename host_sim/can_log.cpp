@@ -247,7 +247,7 @@ std::optional<std::string> difference_to_log(const CanLog& log, const Track& tra
   estimator::EstimateHash hash;
   const std::size_t states = track.state_names.size();
   for (std::size_t k = 0; k < log.unbroken; ++k) {
-    hash.add(track.words[k]);
+    hash.add(track.rows.words()[k]);
     for (std::size_t s = 0; s < states; ++s) hash.add(std::array{track.state_words[k * states + s]});
     if (!log.hashes[k]) continue;
     if (*log.hashes[k] != hash.value())

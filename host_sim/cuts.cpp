@@ -24,14 +24,15 @@ struct Errors {
   std::vector<double> time_s, error, sigma;  ///< time from the cut
 };
 
-Errors errors_of(const measurement::Recording& r, std::size_t first, const std::vector<EstimateRow>& rows) {
+Errors errors_of(const measurement::Recording& r, std::size_t first, const Estimates& rows) {
   Errors e;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     const double reference = r.soc_ref[first + k];
     if (std::isnan(reference)) continue;
     e.time_s.push_back(r.time_s[first + k] - r.time_s[first]);
-    e.error.push_back(rows[k].soc - reference);
-    e.sigma.push_back(rows[k].soc_sigma);
+    const EstimateRow row = rows[k];
+    e.error.push_back(row.soc - reference);
+    e.sigma.push_back(row.soc_sigma);
   }
   return e;
 }

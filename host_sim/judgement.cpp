@@ -41,16 +41,18 @@ std::string likely_cause(const ReplayResult& result) {
                       : "the cell file does not fit the recording";
 }
 
-void check_numbers(const std::vector<EstimateRow>& rows) {
+void check_numbers(const Estimates& rows) {
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (!std::isfinite(rows[k].soc) || !std::isfinite(rows[k].soc_sigma))
+    const EstimateRow e = rows[k];
+    if (!std::isfinite(e.soc) || !std::isfinite(e.soc_sigma))
       throw std::runtime_error(fmt::format("the estimate is not a number from sample {} on", k + 1));
   }
 }
 
-std::size_t count(const std::vector<EstimateRow>& rows, std::uint32_t flags) {
-  return static_cast<std::size_t>(
-      std::count_if(rows.begin(), rows.end(), [flags](const EstimateRow& e) { return (e.flags & flags) != 0; }));
+std::size_t count(const Estimates& rows, std::uint32_t flags) {
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) found += (rows.flags(k) & flags) != 0;
+  return found;
 }
 
 /// The filter does not follow a charge that the cell cannot hold: it estimates the state of charge again. Two witnesses
@@ -67,7 +69,7 @@ std::vector<std::string> doubts_of(const ReplayResult& result) {
   for (const measurement::Warning& w : result.recording.warnings) {
     if (std::find(severe.begin(), severe.end(), w.id) != severe.end()) doubts.push_back(w.text);
   }
-  const std::vector<EstimateRow>& rows = result.track.rows;
+  const Estimates& rows = result.track.rows;
   const std::size_t used = rows.size() - count(rows, voltage_unusable);
   const std::size_t rejected = count(rows, estimator::voltage_rejected);
   if (static_cast<double>(used) < fewest_voltages * static_cast<double>(rows.size()))
@@ -81,10 +83,10 @@ std::vector<std::string> doubts_of(const ReplayResult& result) {
 }  // namespace
 
 Judgement judge(const ReplayResult& result) {
-  const std::vector<EstimateRow>& rows = result.track.rows;
+  const Estimates& rows = result.track.rows;
   check_numbers(rows);
   Judgement judgement;
-  const auto outside = static_cast<double>(std::count_if(rows.begin(), rows.end(), at_the_end));
+  const auto outside = static_cast<double>(std::ranges::count_if(rows, at_the_end));
   if (at_the_end(rows.back()) || outside > most_at_the_end * static_cast<double>(rows.size())) {
     judgement.impossible =
         fmt::format("the state of charge leaves {:g} to {:g} % ({:.1f} % at the end); likely cause: {}",

@@ -26,11 +26,7 @@ constexpr std::size_t current_offset_at = 1, current_offset_sigma_at = 2;
 double number_of(std::uint32_t word, ScalarKind scalar) {
   if (scalar == ScalarKind::float32) return std::bit_cast<float>(word);
   return static_cast<double>(
-      arithmetic::Soc<arithmetic::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.28
-}
-
-std::string formatted(double value, ScalarKind scalar) {
-  return scalar == ScalarKind::float32 ? fmt::format("{}", static_cast<float>(value)) : fmt::format("{}", value);
+      arithmetic::Soc<arithmetic::FixedPoint>::from_raw(static_cast<std::int32_t>(word)));  // all four are Q3.27
 }
 
 }  // namespace
@@ -54,7 +50,20 @@ std::optional<measurement::StartingPoint> starting_point(const std::optional<Soc
       static_cast<std::int32_t>(std::lround(prior->sigma * 1e9))};
 }
 
-Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
+EstimateRow Estimates::operator[](std::size_t row) const {
+  static_assert(std::same_as<arithmetic::Soc<arithmetic::FixedPoint>, arithmetic::Voltage<arithmetic::FixedPoint>>,
+                "one conversion serves all four numbers");
+  if (scalar_ == ScalarKind::float64) return numbers_[row];
+  const estimator::EstimateWords& w = words_[row];
+  return {number_of(w[0], scalar_), number_of(w[1], scalar_), number_of(w[2], scalar_), number_of(w[3], scalar_), w[4]};
+}
+
+double Track::state(std::size_t row, std::size_t index) const {
+  const std::size_t at = row * state_names.size() + index;
+  return state_scales[index] * (scalar == ScalarKind::float64 ? state_numbers[at] : number_of(state_words[at], scalar));
+}
+
+Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples,
                   const std::optional<measurement::StartingPoint>& start, ScalarKind scalar, Timing timing) {
   Track track = [&] {
     switch (scalar) {
@@ -67,8 +76,8 @@ Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sa
         return run<float>(cell, samples, start, timing);
     }
   }();
+  track.scalar = scalar;
   name_states(track, cell);
-  number_states(track, scalar);
   return track;
 }
 
@@ -93,33 +102,12 @@ void name_states(Track& track, const files::CellFile& cell) {
   }
 }
 
-void number_states(Track& track, ScalarKind scalar) {
-  if (scalar != ScalarKind::float64) {
-    track.states.clear();
-    for (const std::uint32_t w : track.state_words) track.states.push_back(number_of(w, scalar));
-  }
-  for (std::size_t k = 0; k < track.states.size(); ++k) {
-    track.states[k] *= track.state_scales[k % track.state_scales.size()];
-  }
-}
-
-std::vector<EstimateRow> rows_of(const std::vector<estimator::EstimateWords>& words, ScalarKind scalar) {
-  static_assert(std::same_as<arithmetic::Soc<arithmetic::FixedPoint>, arithmetic::Voltage<arithmetic::FixedPoint>>,
-                "one conversion serves all four numbers");
-  std::vector<EstimateRow> rows;
-  rows.reserve(words.size());
-  for (const estimator::EstimateWords& w : words) {
-    rows.push_back(
-        {number_of(w[0], scalar), number_of(w[1], scalar), number_of(w[2], scalar), number_of(w[3], scalar), w[4]});
-  }
-  return rows;
-}
-
 std::optional<Difference> first_difference(const Track& host, const Track& board, ScalarKind scalar) {
-  const std::size_t both = std::min(host.words.size(), board.words.size());
+  const std::vector<estimator::EstimateWords>&words = host.rows.words(), &others = board.rows.words();
+  const std::size_t both = std::min(words.size(), others.size());
   for (std::size_t k = 0; k < both; ++k) {
     for (std::size_t w = 0; w < estimator::estimate_words; ++w) {
-      const std::uint32_t a = host.words[k][w], b = board.words[k][w];
+      const std::uint32_t a = words[k][w], b = others[k][w];
       if (a == b) continue;
       const bool flags = w + 1 == estimator::estimate_words;
       return Difference{k, estimator::estimate_word_names[w], flags ? a : number_of(a, scalar),
@@ -131,9 +119,9 @@ std::optional<Difference> first_difference(const Track& host, const Track& board
       if (a != b) return Difference{k, host.state_names[s], number_of(a, scalar), number_of(b, scalar)};
     }
   }
-  if (host.words.size() != board.words.size())
-    return Difference{both, "number of estimates", static_cast<double>(host.words.size()),
-                      static_cast<double>(board.words.size())};
+  if (words.size() != others.size())
+    return Difference{both, "number of estimates", static_cast<double>(words.size()),
+                      static_cast<double>(others.size())};
   return std::nullopt;
 }
 
@@ -157,23 +145,23 @@ double open_loop_start(const ReplayResult& result) {
 
 SocFigures soc_figures(const ReplayResult& result) {
   const measurement::Recording& r = result.recording;
-  const std::vector<EstimateRow>& rows = result.track.rows;
+  const Estimates& rows = result.track.rows;
   identification::ErrorFigure all, later;
   std::size_t inside = 0;
   for (std::size_t k = 0; k < rows.size() && !r.soc_ref.empty(); ++k) {
     if (std::isnan(r.soc_ref[k])) continue;
-    const double error = rows[k].soc - r.soc_ref[k];
+    const EstimateRow e = rows[k];
+    const double error = e.soc - r.soc_ref[k];
     all.add(error);
     if (r.time_s[k] - r.time_s.front() >= thirty_minutes_s) later.add(error);
-    if (std::abs(error) <= 2 * rows[k].soc_sigma) ++inside;
+    if (std::abs(error) <= 2 * e.soc_sigma) ++inside;
   }
   SocFigures figures;
   figures.final = rows.back().soc;
   figures.final_sigma = rows.back().soc_sigma;
   if (result.cell.parameters.noise.errors_are_states) {
-    const std::size_t last = (rows.size() - 1) * result.track.state_names.size();
-    figures.current_offset_a = result.track.states[last + current_offset_at];
-    figures.current_offset_sigma_a = result.track.states[last + current_offset_sigma_at];
+    figures.current_offset_a = result.track.state(rows.size() - 1, current_offset_at);
+    figures.current_offset_sigma_a = result.track.state(rows.size() - 1, current_offset_sigma_at);
   }
   if (all.count() > 0) {
     figures.rmse = all.rms();
@@ -189,12 +177,13 @@ SocFigures soc_figures(const ReplayResult& result) {
 
 VoltageFigures voltage_figures(const ReplayResult& result) {
   const measurement::Column& measured_v = result.recording.voltage_v;
-  const std::vector<EstimateRow>& rows = result.track.rows;
+  const Estimates& rows = result.track.rows;
   identification::ErrorFigure prediction, open_loop;
   identification::FitFigure fit;
   for (std::size_t k = 0; k < rows.size(); ++k) {
-    if (k > 0 && (rows[k].flags & voltage_not_used) == 0) prediction.add(measured_v[k] - rows[k].voltage_predicted_v);
-    if ((rows[k].flags & voltage_not_measured) != 0) continue;
+    const EstimateRow e = rows[k];
+    if (k > 0 && (e.flags & voltage_not_used) == 0) prediction.add(measured_v[k] - e.voltage_predicted_v);
+    if ((e.flags & voltage_not_measured) != 0) continue;
     open_loop.add(measured_v[k] - result.open_loop_v[k]);
     fit.add(measured_v[k], result.open_loop_v[k]);
   }
@@ -216,34 +205,48 @@ void evaluate(ReplayResult& result) {
   const measurement::Recording& r = result.recording;
   if (!result.prior) result.initial_soc = result.track.rows.front().soc;
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
-  const auto open_loop = simulate({.cell = cell,
-                                   .capacity_ah = result.cell.parameters.capacity_ah,
-                                   .mechanisms = result.cell.mechanisms,
-                                   .time_s = r.time_s,
-                                   .current_a = r.current_a,
-                                   .temperature_c = r.temperature_c,
-                                   .initial_soc = open_loop_start(result)});
-  for (const SimulatedRow& row : open_loop) result.open_loop_v.push_back(row.voltage_v);
+  result.open_loop_v.reserve(r.rows());
+  simulate({.cell = cell,
+            .capacity_ah = result.cell.parameters.capacity_ah,
+            .mechanisms = result.cell.mechanisms,
+            .time_s = r.time_s,
+            .current_a = r.current_a,
+            .temperature_c = r.temperature_c,
+            .initial_soc = open_loop_start(result)},
+           [&](const SimulatedRow& row) { result.open_loop_v.push_back(row.voltage_v); });
   result.soc = soc_figures(result);
   result.voltage = voltage_figures(result);
 }
 
-std::string trace_csv(const ReplayResult& result) {
+void write_trace(const ReplayResult& result, const files::Sink& sink) {
+  constexpr std::size_t piece_bytes = 1U << 20;
   const auto& names = result.track.state_names;
   std::string csv = "time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,";
   for (const std::string& name : names) csv += name + ",";
   csv += "flags\n";
-  csv.reserve(result.track.rows.size() * 80);
-  const ScalarKind s = result.scalar;
+  const auto number = [&](double value) {
+    if (result.scalar == ScalarKind::float32)
+      fmt::format_to(std::back_inserter(csv), "{},", static_cast<float>(value));
+    else
+      fmt::format_to(std::back_inserter(csv), "{},", value);
+  };
   for (std::size_t k = 0; k < result.track.rows.size(); ++k) {
-    const EstimateRow& e = result.track.rows[k];
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},", result.recording.time_s[k], formatted(e.soc, s),
-                   formatted(e.soc_sigma, s), formatted(e.v_rc_v, s), formatted(e.voltage_predicted_v, s),
-                   result.recording.voltage_v[k]);
-    for (std::size_t i = 0; i < names.size(); ++i)
-      fmt::format_to(std::back_inserter(csv), "{},", formatted(result.track.states[k * names.size() + i], s));
+    const EstimateRow e = result.track.rows[k];
+    fmt::format_to(std::back_inserter(csv), "{},", result.recording.time_s[k]);
+    for (const double value : {e.soc, e.soc_sigma, e.v_rc_v, e.voltage_predicted_v}) number(value);
+    fmt::format_to(std::back_inserter(csv), "{},", result.recording.voltage_v[k]);
+    for (std::size_t i = 0; i < names.size(); ++i) number(result.track.state(k, i));
     fmt::format_to(std::back_inserter(csv), "{}\n", e.flags);
+    if (csv.size() < piece_bytes) continue;
+    sink(csv);
+    csv.clear();
   }
+  sink(csv);
+}
+
+std::string trace_csv(const ReplayResult& result) {
+  std::string csv;
+  write_trace(result, [&](std::string_view piece) { csv += piece; });
   return csv;
 }
 

@@ -3,12 +3,14 @@
 
 #include <cstdint>
 #include <functional>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "estimator/estimate.hpp"
 #include "files/cell_file.hpp"
+#include "files/text_file.hpp"
 #include "measurement/recording.hpp"
 
 namespace bms::host_sim {
@@ -21,17 +23,67 @@ struct EstimateRow {
   std::uint32_t flags = 0;
 };
 
-/// The estimates of one run. `states` are the further states of an extended cell, state_names.size() for each row:
-/// sensor errors, then states of mechanisms.
+/// The estimates of one run, a row per sample. In float and in fixed point only the bits are stored, because a
+/// recording may have millions of rows; a row is made when it is read.
+class Estimates {
+ public:
+  Estimates() = default;
+  /// scalar: of the words, not double
+  Estimates(std::vector<estimator::EstimateWords> words, ScalarKind scalar)
+      : words_(std::move(words)), scalar_(scalar) {}
+  explicit Estimates(std::vector<EstimateRow> numbers) : numbers_(std::move(numbers)), scalar_(ScalarKind::float64) {}
+
+  std::size_t size() const { return scalar_ == ScalarKind::float64 ? numbers_.size() : words_.size(); }
+  bool empty() const { return size() == 0; }
+  EstimateRow operator[](std::size_t row) const;
+  EstimateRow front() const { return (*this)[0]; }
+  EstimateRow back() const { return (*this)[size() - 1]; }
+  std::uint32_t flags(std::size_t row) const {
+    return scalar_ == ScalarKind::float64 ? numbers_[row].flags : words_[row].back();
+  }
+  /// The bits that host and board are compared by; empty for double.
+  const std::vector<estimator::EstimateWords>& words() const { return words_; }
+
+  class Iterator {
+   public:
+    using difference_type = std::ptrdiff_t;
+    using value_type = EstimateRow;
+    Iterator() = default;
+    Iterator(const Estimates& all, std::size_t row) : all_(&all), row_(row) {}
+    EstimateRow operator*() const { return (*all_)[row_]; }
+    Iterator& operator++() {
+      ++row_;
+      return *this;
+    }
+    Iterator operator++(int) { return {*all_, row_++}; }
+    bool operator==(const Iterator& other) const { return row_ == other.row_; }
+
+   private:
+    const Estimates* all_ = nullptr;
+    std::size_t row_ = 0;
+  };
+  Iterator begin() const { return {*this, 0}; }
+  Iterator end() const { return {*this, size()}; }
+
+ private:
+  std::vector<estimator::EstimateWords> words_;
+  std::vector<EstimateRow> numbers_;  ///< of double
+  ScalarKind scalar_ = ScalarKind::float32;
+};
+
+/// One run. The further states of an extended cell are sensor errors, then states of mechanisms.
 struct Track {
-  std::vector<EstimateRow> rows;
-  std::vector<estimator::EstimateWords> words;  ///< their bits; empty for double
+  Estimates rows;
+  ScalarKind scalar = ScalarKind::float32;
   std::vector<std::string>
       state_names;  ///< "current_offset_a", "ocv_hysteresis_v", "slow_polarisation_1_v", "self_heating_k"
-  std::vector<double> state_scales;  ///< factor from the number in a word to the unit in the name
-  std::vector<double> states;        ///< V, K, A
-  std::vector<std::uint32_t> state_words;
+  std::vector<double> state_scales;        ///< factor from the number in a word to the unit in the name
+  std::vector<std::uint32_t> state_words;  ///< state_names.size() for each row; empty for double
+  std::vector<double> state_numbers;       ///< the same, of double
   double steps_per_second = 0;
+
+  /// A further state, from 0, in V, K or A.
+  double state(std::size_t row, std::size_t index) const;
 };
 
 /// State of charge before the first sample, as assumed by the user, and its standard deviation.
@@ -50,15 +102,9 @@ void name_states(Track& track, const files::CellFile& cell);
 enum class Timing { measured, none };
 
 /// Runs the estimator on this machine. Throws BadInput if the cell file cannot be computed with this scalar.
-Track run_on_host(const files::CellFile& cell, const std::vector<measurement::Sample>& samples,
+Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples,
                   const std::optional<measurement::StartingPoint>& start, ScalarKind scalar,
                   Timing timing = Timing::measured);
-
-/// Computes the numbers of the states from their words.
-void number_states(Track& track, ScalarKind scalar);
-
-/// Numbers of the words that a board sends.
-std::vector<EstimateRow> rows_of(const std::vector<estimator::EstimateWords>& words, ScalarKind scalar);
 
 /// The first difference between two runs.
 struct Difference {
@@ -100,7 +146,9 @@ struct ReplayResult {
 /// one, else at initial_soc.
 void evaluate(ReplayResult& result);
 
-/// CSV: time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v, further states, flags
+/// CSV: time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v, further states, flags. write_trace() gives
+/// it piece by piece: it may be larger than the memory.
+void write_trace(const ReplayResult& result, const files::Sink& sink);
 std::string trace_csv(const ReplayResult& result);
 
 /// "float", "fixed", "double": as on the command line.

@@ -8,9 +8,12 @@
 
 #include <algorithm>
 #include <chrono>
+#include <concepts>
 #include <cstddef>
-#include <limits>
 #include <optional>
+#include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "estimator/soc_estimator.hpp"
@@ -25,7 +28,12 @@ inline constexpr std::size_t error_values = 3;
 
 namespace replay_detail {
 
+template <class S>
+inline constexpr ScalarKind kind_of = std::same_as<S, float> ? ScalarKind::float32 : ScalarKind::fixed;
+
 inline constexpr double timing_s = 0.03;  ///< long enough for the clock and a cold cache
+
+inline constexpr std::size_t block_rows = 4'096;  ///< samples and estimates in between stay in the cache
 
 template <class S>
 EstimateRow row_of(const estimator::Estimate<S>& e) {
@@ -33,62 +41,90 @@ EstimateRow row_of(const estimator::Estimate<S>& e) {
           arithmetic::as_double(e.voltage_predicted_v), e.flags};
 }
 
+/// The estimator is a local variable, so that its state may stay in registers.
 template <class Estimator, class Cell>
-void step_through(const Cell& cell, const std::vector<measurement::Sample>& samples,
-                  const std::optional<measurement::StartingPoint>& start,
+void step_through(const Cell& cell, std::span<const measurement::Sample> samples, Estimator& continued,
                   std::vector<typename Estimator::Result>& estimates) {
-  Estimator estimator = start ? Estimator(*start) : Estimator();
+  Estimator estimator = continued;
   for (std::size_t k = 0; k < samples.size(); ++k) estimates[k] = estimator.step(cell, samples[k]);
+  continued = estimator;
 }
 
 template <class Estimator, class Cell>
-[[gnu::flatten]] void step_through_flat(const Cell& cell, const std::vector<measurement::Sample>& samples,
-                                        const std::optional<measurement::StartingPoint>& start,
-                                        std::vector<typename Estimator::Result>& estimates) {
-  step_through<Estimator>(cell, samples, start, estimates);
+[[gnu::flatten]] void step_through_flat(const Cell& cell, std::span<const measurement::Sample> samples,
+                                        Estimator& continued, std::vector<typename Estimator::Result>& estimates) {
+  step_through<Estimator>(cell, samples, continued, estimates);
 }
 
-template <class Estimator, class Cell>
-Track run_estimator(const Cell& cell, const std::vector<measurement::Sample>& samples,
-                    const std::optional<measurement::StartingPoint>& start, std::size_t extra, Timing timing) {
-  using S = typename Estimator::Scalar;
-  std::vector<typename Estimator::Result> estimates(samples.size());
-  double best_s = std::numeric_limits<double>::infinity(), total_s = 0;
-  do {
+/// Runs once and calls take(estimates, count) for each block. Returns the seconds of the estimator alone.
+template <class Estimator, class Cell, class Take>
+double run_once(const Cell& cell, const measurement::SampleList& samples,
+                const std::optional<measurement::StartingPoint>& start, Take&& take) {
+  Estimator estimator = start ? Estimator(*start) : Estimator();
+  std::vector<measurement::Sample> space;
+  std::vector<typename Estimator::Result> estimates(std::min(block_rows, samples.size()));
+  double seconds = 0;
+  for (std::size_t first = 0; first < samples.size(); first += block_rows) {
+    const std::span<const measurement::Sample> block = samples.part(first, block_rows, space);
     const auto begin = std::chrono::steady_clock::now();
     if constexpr (Estimator::extra_values == 0)
-      step_through_flat<Estimator>(cell, samples, start, estimates);
+      step_through_flat<Estimator>(cell, block, estimator, estimates);
     else
-      step_through<Estimator>(cell, samples, start, estimates);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    best_s = std::min(best_s, seconds);
-    total_s += seconds;
-  } while (timing == Timing::measured && total_s < timing_s);
+      step_through<Estimator>(cell, block, estimator, estimates);
+    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    take(estimates, block.size());
+  }
+  return seconds;
+}
 
+template <class Estimator, class Cell>
+Track run_estimator(const Cell& cell, const measurement::SampleList& samples,
+                    const std::optional<measurement::StartingPoint>& start, std::size_t extra, Timing timing) {
+  using S = typename Estimator::Scalar;
+  constexpr bool numbers = std::same_as<S, double>;
+  std::vector<std::conditional_t<numbers, EstimateRow, estimator::EstimateWords>> rows;
+  rows.reserve(samples.size());
   Track track;
-  track.steps_per_second = static_cast<double>(samples.size()) / best_s;
-  track.rows.reserve(samples.size());
-  for (const auto& e : estimates) {
-    track.rows.push_back(row_of<S>(e));
-    if constexpr (!std::same_as<S, double>)
-      track.words.push_back(estimator::words(static_cast<const estimator::Estimate<S>&>(e)));
-    if constexpr (Estimator::extra_values > 0) {
-      for (std::size_t k = 0; k < extra; ++k) {
-        if constexpr (std::same_as<S, double>)
-          track.states.push_back(e.extra[k]);
-        else
-          track.state_words.push_back(estimator::word(e.extra[k]));
+  if constexpr (numbers)
+    track.state_numbers.reserve(samples.size() * extra);
+  else
+    track.state_words.reserve(samples.size() * extra);
+  const auto keep = [&](const std::vector<typename Estimator::Result>& estimates, std::size_t count) {
+    for (std::size_t row = 0; row < count; ++row) {
+      const auto& e = estimates[row];
+      if constexpr (numbers)
+        rows.push_back(row_of<S>(e));
+      else
+        rows.push_back(estimator::words(static_cast<const estimator::Estimate<S>&>(e)));
+      if constexpr (Estimator::extra_values > 0) {
+        for (std::size_t k = 0; k < extra; ++k) {
+          if constexpr (numbers)
+            track.state_numbers.push_back(e.extra[k]);
+          else
+            track.state_words.push_back(estimator::word(e.extra[k]));
+        }
       }
     }
+  };
+  double best_s = run_once<Estimator>(cell, samples, start, keep), total_s = best_s;
+  while (timing == Timing::measured && total_s < timing_s) {
+    const double seconds = run_once<Estimator>(cell, samples, start, [](const auto&, std::size_t) {});
+    best_s = std::min(best_s, seconds);
+    total_s += seconds;
   }
+  track.steps_per_second = static_cast<double>(samples.size()) / best_s;
+  if constexpr (numbers)
+    track.rows = Estimates(std::move(rows));
+  else
+    track.rows = Estimates(std::move(rows), kind_of<S>);
   return track;
 }
 
 /// Runs the estimator with as many states as the mechanisms of the cell have voltages.
 template <class S, bool Errors, std::size_t Voltages = 0>
 Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
-                   const std::vector<measurement::Sample>& samples,
-                   const std::optional<measurement::StartingPoint>& start, Timing timing) {
+                   const measurement::SampleList& samples, const std::optional<measurement::StartingPoint>& start,
+                   Timing timing) {
   using Laws = model::ChosenLaws<S>;
   if constexpr (Voltages < Laws::most_voltage_states) {
     if (cell.laws.voltage_states() > Voltages)
@@ -101,7 +137,7 @@ Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::Cho
 /// errors: sensor errors are states of the filter.
 template <class S>
 Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, bool errors,
-                          const std::vector<measurement::Sample>& samples,
+                          const measurement::SampleList& samples,
                           const std::optional<measurement::StartingPoint>& start, Timing timing) {
   return errors ? run_extended<S, true>(cell, samples, start, timing)
                 : run_extended<S, false>(cell, samples, start, timing);
@@ -110,13 +146,13 @@ Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, mod
 using FixedExtendedCell =
     model::ExtendedCell<arithmetic::FixedPoint, model::max_intervals, model::ChosenLaws<arithmetic::FixedPoint>>;
 extern template Track run_with_mechanisms<arithmetic::FixedPoint>(
-    const FixedExtendedCell& cell, bool errors, const std::vector<measurement::Sample>& samples,
+    const FixedExtendedCell& cell, bool errors, const measurement::SampleList& samples,
     const std::optional<measurement::StartingPoint>& start, Timing timing);
 
 }  // namespace replay_detail
 
 template <class S>
-Track run(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+Track run(const files::CellFile& file, const measurement::SampleList& samples,
           const std::optional<measurement::StartingPoint>& start, Timing timing) {
   const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
   const auto mechanisms = files::on_board(file.mechanisms);
@@ -128,12 +164,11 @@ Track run(const files::CellFile& file, const std::vector<measurement::Sample>& s
   return replay_detail::run_with_mechanisms<S>(extended, errors, samples, start, timing);
 }
 
-extern template Track run<float>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+extern template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples,
                                  const std::optional<measurement::StartingPoint>& start, Timing timing);
-extern template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+extern template Track run<double>(const files::CellFile& file, const measurement::SampleList& samples,
                                   const std::optional<measurement::StartingPoint>& start, Timing timing);
-extern template Track run<arithmetic::FixedPoint>(const files::CellFile& file,
-                                                  const std::vector<measurement::Sample>& samples,
+extern template Track run<arithmetic::FixedPoint>(const files::CellFile& file, const measurement::SampleList& samples,
                                                   const std::optional<measurement::StartingPoint>& start,
                                                   Timing timing);
 

@@ -2,7 +2,7 @@
 
 namespace bms::host_sim {
 
-template Track run<double>(const files::CellFile& file, const std::vector<measurement::Sample>& samples,
+template Track run<double>(const files::CellFile& file, const measurement::SampleList& samples,
                            const std::optional<measurement::StartingPoint>& start, Timing timing);
 
 }  // namespace bms::host_sim

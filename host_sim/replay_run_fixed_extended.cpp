@@ -3,7 +3,7 @@
 namespace bms::host_sim::replay_detail {
 
 template Track run_with_mechanisms<arithmetic::FixedPoint>(const FixedExtendedCell& cell, bool errors,
-                                                           const std::vector<measurement::Sample>& samples,
+                                                           const measurement::SampleList& samples,
                                                            const std::optional<measurement::StartingPoint>& start,
                                                            Timing timing);
 

@@ -44,46 +44,52 @@ inline double value_of(std::span<const model::MechanismSetting> mechanisms, std:
 
 /// The 1RC model alone. model::OpenLoopSimulation without laws rounds the charge differently (duration times
 /// 1 / capacity instead of a quotient), so this loop is needed for the bits of a cell file without mechanisms.
-inline std::vector<SimulatedRow> simulate_one_rc(const SimulationInput& in) {
+template <class Take>
+void simulate_one_rc(const SimulationInput& in, Take&& take) {
   using Model = model::OneRc<double>;
-  std::vector<SimulatedRow> rows(in.time_s.size());
   Model::State x{};
   double soc = in.initial_soc, last_known_a = 0;
   std::uint8_t interval = 0;
-  for (std::size_t k = 0; k < rows.size(); ++k) {
+  for (std::size_t k = 0; k < in.time_s.size(); ++k) {
     const double duration_s = k == 0 ? 0 : in.time_s[k] - in.time_s[k - 1];
     if (!std::isnan(in.current_a[k])) last_known_a = in.current_a[k];
     const model::StepInput<double> input{last_known_a, duration_s};
     soc = std::clamp(soc + input.current_a * duration_s / (3'600 * in.capacity_ah), model::min_soc, model::max_soc);
     const auto at = model::look_up(in.cell, soc, interval);
     if (duration_s > 0) x = Model::advance(x, at, Model::discretise(at, duration_s), input);
-    rows[k] = {Model::voltage(x, at, input), soc};
+    take(SimulatedRow{Model::voltage(x, at, input), soc});
   }
-  return rows;
 }
 
-/// Simulates a cell that rests at initial_soc before the first row. With mechanisms and sensor faults, current and
-/// temperature are as measured, and the result is the voltage that would be measured; the mechanism initial_soc is
-/// added to the start.
+/// Simulates a cell that rests at initial_soc before the first row, and calls take(SimulatedRow) for each row. With
+/// mechanisms and sensor faults, current and temperature are as measured, and the result is the voltage that would be
+/// measured; the mechanism initial_soc is added to the start.
 ///
 /// A missing current (NaN) is replaced by the last known one. soc is clamped to model::min_soc .. model::max_soc, as in
 /// the estimator. Row 0 has no interval before it: its voltage is that of the rested cell plus R0 I. A row whose time
 /// is not later than the previous one repeats the state.
-inline std::vector<SimulatedRow> simulate(const SimulationInput& in) {
-  if (in.mechanisms.empty()) return simulate_one_rc(in);
+template <class Take>
+void simulate(const SimulationInput& in, Take&& take) {
+  if (in.mechanisms.empty()) return simulate_one_rc(in, take);
   const model::CorrectedReadings<double> readings(in.time_s, in.current_a, in.temperature_c,
                                                   value_of(in.mechanisms, model::ChannelSkew::id, 0),
                                                   value_of(in.mechanisms, model::TemperatureSensor::id, 1));
   model::OpenLoopSimulation<double> simulation(in.cell, in.capacity_ah,
                                                model::chosen<double>(in.mechanisms, in.capacity_ah),
                                                in.initial_soc + value_of(in.mechanisms, model::InitialSoc::id, 0));
-  std::vector<SimulatedRow> rows(in.time_s.size());
-  for (std::size_t k = 0; k < rows.size(); ++k) {
+  for (std::size_t k = 0; k < in.time_s.size(); ++k) {
     const double duration_s = k == 0 ? 0 : in.time_s[k] - in.time_s[k - 1];
     const double voltage_v = simulation.step(in.time_s[k], duration_s, readings.current(k), readings.temperature(k),
                                              [](auto&, const auto&) {});
-    rows[k] = {voltage_v, simulation.soc()};
+    take(SimulatedRow{voltage_v, simulation.soc()});
   }
+}
+
+/// The same, as a list.
+inline std::vector<SimulatedRow> simulate(const SimulationInput& in) {
+  std::vector<SimulatedRow> rows;
+  rows.reserve(in.time_s.size());
+  simulate(in, [&](const SimulatedRow& row) { rows.push_back(row); });
   return rows;
 }
 

@@ -153,10 +153,9 @@ host_sim::Track run_on_board(const EmulatedBoard& board, const files::CellFile& 
   host_sim::name_states(track, cell);
   BoardRun run = run_on_board(board, firmware_image(board.name, cell, Image::replay), samples, start, {},
                               track.state_names.size());
-  track.rows = host_sim::rows_of(run.words, board.scalar);
-  track.words = std::move(run.words);
+  track.scalar = board.scalar;
+  track.rows = host_sim::Estimates(std::move(run.words), board.scalar);
   track.state_words = std::move(run.state_words);
-  host_sim::number_states(track, board.scalar);
   track.steps_per_second = run.steps_per_second;
   return track;
 }

@@ -33,15 +33,25 @@ Sample sample_of(double time_s, double current_a, double voltage_v, double tempe
           centidegrees(temperature_c)};
 }
 
-std::vector<Sample> samples(const Recording& r) {
+std::span<const Sample> SampleList::part(std::size_t first, std::size_t count, std::vector<Sample>& space) const {
+  const std::size_t end = first + std::min(count, size() - first);
+  if (recording_ == nullptr) return list_.subspan(first, end - first);
+  const Recording& r = *recording_;
   constexpr double missing = std::numeric_limits<double>::quiet_NaN();
-  std::vector<Sample> out(r.rows());
-  for (std::size_t k = 0; k < r.rows(); ++k) {
+  space.clear();
+  for (std::size_t k = first; k < end; ++k) {
     const bool voltage = !r.voltage_v.empty() && is_voltage_of_the_cell(r, k);
-    out[k] = sample_of(r.time_s[k] - r.time_s.front(), r.current_a[k], voltage ? r.voltage_v[k] : missing,
-                       r.temperature_c.empty() ? missing : r.temperature_c[k]);
+    space.push_back(sample_of(r.time_s[k] - r.time_s.front(), r.current_a[k], voltage ? r.voltage_v[k] : missing,
+                              r.temperature_c.empty() ? missing : r.temperature_c[k]));
   }
-  return out;
+  return space;
+}
+
+std::vector<Sample> samples(const Recording& recording) {
+  std::vector<Sample> all;
+  all.reserve(recording.rows());
+  SampleList(recording).part(0, recording.rows(), all);
+  return all;
 }
 
 Recording cell(const Recording& pack, std::size_t index) {

@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -59,6 +60,22 @@ Recording cell(const Recording& pack, std::size_t index);
 /// The recording as the estimator receives it: integers in micro-units, time from the first row. A voltage that may be
 /// a reference source's is left out.
 std::vector<Sample> samples(const Recording& recording);
+
+/// Samples to read one part after the other. Those of a recording are made when they are read: a recording of millions
+/// of rows is not stored twice. Views the list or the recording.
+class SampleList {
+ public:
+  SampleList(const std::vector<Sample>& list) : list_(list) {}  // NOLINT(google-explicit-constructor): a list of them
+  explicit SampleList(const Recording& recording) : recording_(&recording) {}
+
+  std::size_t size() const { return recording_ != nullptr ? recording_->rows() : list_.size(); }
+  /// `count` samples from `first` on, or fewer at the end; `space` is where they are made.
+  std::span<const Sample> part(std::size_t first, std::size_t count, std::vector<Sample>& space) const;
+
+ private:
+  std::span<const Sample> list_;
+  const Recording* recording_ = nullptr;
+};
 
 /// One of these samples. time_s: since the first; a reading that is NaN is missing.
 Sample sample_of(double time_s, double current_a, double voltage_v, double temperature_c);

@@ -18,8 +18,13 @@ namespace bms::python {
 namespace {
 
 using host_sim::EstimateRow;
-using host_sim::ReplayResult;
-using Result = std::shared_ptr<ReplayResult>;
+
+/// numbers, states: arrays of Python are views of them; made when the first is asked for.
+struct Replayed : host_sim::ReplayResult {
+  std::vector<EstimateRow> numbers;
+  std::vector<double> states;
+};
+using Result = std::shared_ptr<Replayed>;
 
 host_sim::ScalarKind scalar_of(const std::string& name) {
   for (const auto kind : {host_sim::ScalarKind::float32, host_sim::ScalarKind::fixed, host_sim::ScalarKind::float64}) {
@@ -42,7 +47,7 @@ double start_shift(const files::CellFile& cell) {
 /// As `bms replay`: impossible estimates are errors.
 Result replay(const files::CellFile& cell, const measurement::Recording& recording, std::optional<double> initial_soc,
               double initial_soc_sigma, const std::string& scalar) {
-  auto result = std::make_shared<ReplayResult>();
+  auto result = std::make_shared<Replayed>();
   result->scalar = scalar_of(scalar);
   result->prior = prior_of(initial_soc, initial_soc_sigma);
   const py::gil_scoped_release released;
@@ -53,7 +58,7 @@ Result replay(const files::CellFile& cell, const measurement::Recording& recordi
   measurement::compare_with_cell(result->recording, cell.parameters);
   if (const std::string what = measurement::contradiction(result->recording); !what.empty())
     throw files::BadInput(recording.path, 1, what);
-  result->track = host_sim::run_on_host(cell, measurement::samples(result->recording),
+  result->track = host_sim::run_on_host(cell, measurement::SampleList(result->recording),
                                         host_sim::starting_point(result->prior, start_shift(cell)), result->scalar,
                                         host_sim::Timing::none);
   result->initial_soc = initial_soc.value_or(result->track.rows.front().soc);
@@ -75,11 +80,19 @@ py::array view_of_rows(const Result& result, const T* first, std::size_t stride_
   return array;
 }
 
+const EstimateRow* numbers_of(const Result& result) {
+  const host_sim::Estimates& rows = result->track.rows;
+  if (result->numbers.empty()) result->numbers.assign(rows.begin(), rows.end());
+  return result->numbers.data();
+}
+
 py::dict states_of(const Result& result) {
   py::dict states;
   const auto& names = result->track.state_names;
+  for (std::size_t k = result->states.size(); k < names.size() * result->track.rows.size(); ++k)
+    result->states.push_back(result->track.state(k / names.size(), k % names.size()));
   for (std::size_t k = 0; k < names.size(); ++k)
-    states[py::str(names[k])] = view_of_rows(result, result->track.states.data() + k, names.size() * sizeof(double));
+    states[py::str(names[k])] = view_of_rows(result, result->states.data() + k, names.size() * sizeof(double));
   return states;
 }
 
@@ -102,11 +115,10 @@ py::dict figures_of(const Result& result) {
 }
 
 void bind_replay_result(py::module_& module) {
-  py::class_<ReplayResult, Result> c(module, "Replay", "The estimates of a replay, one row per row of the recording.");
+  py::class_<Replayed, Result> c(module, "Replay", "The estimates of a replay, one row per row of the recording.");
   const auto column = [&](const char* name, double EstimateRow::*member, const char* help) {
     c.def_property_readonly(
-        name,
-        [member](const Result& r) { return view_of_rows(r, &(r->track.rows.data()->*member), sizeof(EstimateRow)); },
+        name, [member](const Result& r) { return view_of_rows(r, &(numbers_of(r)->*member), sizeof(EstimateRow)); },
         help);
   };
   c.def_property_readonly(
@@ -116,7 +128,7 @@ void bind_replay_result(py::module_& module) {
   column("v_rc_v", &EstimateRow::v_rc_v, "Voltage over the RC branch [V]: shape (n,).");
   column("voltage_predicted_v", &EstimateRow::voltage_predicted_v, "Voltage that the model expected [V]: shape (n,).");
   c.def_property_readonly(
-      "flags", [](const Result& r) { return view_of_rows(r, &r->track.rows.data()->flags, sizeof(EstimateRow)); },
+      "flags", [](const Result& r) { return view_of_rows(r, &numbers_of(r)->flags, sizeof(EstimateRow)); },
       "Why an estimate is less accurate, greybox_bms.FLAGS or-ed: shape (n,), uint32.");
   c.def_property_readonly("states", &states_of, "{name: shape (n,)}: further states of an extended cell [V, K, A].");
   c.def_property_readonly("figures", &figures_of,

@@ -37,8 +37,8 @@ std::string amperes(double a) {
 
 std::string offset_text(const SensorFinding& f) {
   if (!f.value) return f.why;
-  return fmt::format("reads {} +- {} too {}", amperes(std::abs(f.value->value)), amperes(f.value->std),
-                     f.value->value < 0 ? "low" : "high");
+  return fmt::format("reads {} +- {} too {}{}", amperes(std::abs(f.value->value)), amperes(f.value->std),
+                     f.value->value < 0 ? "low" : "high", f.why.empty() ? "" : ", " + f.why);
 }
 
 std::string gain_text(const SensorFinding& f) {
@@ -91,7 +91,7 @@ std::string statement_of(const Ammeter& a) {
   if (a.clipping_a.value) return fmt::format("The current sensor is clipped {}.", clipping_text(a.clipping_a));
   if (!a.offset_a.value) return "This log does not show the offset of the current sensor: " + a.offset_a.why + ".";
   std::string text = fmt::format("The current sensor {}", offset_text(a.offset_a));
-  if (a.gain.value) text += fmt::format(" and {}", gain_text(a.gain));
+  if (a.gain.value) text += fmt::format("; it {}", gain_text(a.gain));
   text += ".";
   if (workflow::correction_of(a).empty()) text += " That is within two standard deviations: no correction.";
   return text;

@@ -46,7 +46,6 @@ struct ReplayOptions {
 struct ReplayRun {
   const images::EmulatedBoard* board = nullptr;  ///< nullptr: the host
   std::optional<host_sim::CanLog> log;
-  std::vector<measurement::Sample> samples;
   std::optional<measurement::StartingPoint> start;
   std::size_t compared = 0;     ///< samples of the log whose estimates were compared
   std::vector<PackCell> cells;  ///< of a pack recording
@@ -153,7 +152,6 @@ ReplayRun read(const ReplayOptions& options) {
   measurement::compare_with_cell(result.recording, result.cell.parameters);
   refuse_contradiction(result.recording);
   add_warnings(options, run);
-  run.samples = run.log ? run.log->samples : measurement::samples(result.recording);
   if (options.initial_soc) {
     result.prior = host_sim::SocPrior{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
@@ -179,10 +177,13 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
   host_sim::ReplayResult& result = run.result;
   if (run.board != nullptr) {
     const files::CellFile board_cell = options.board_cell.empty() ? result.cell : files::read_cell(options.board_cell);
-    result.track = run_on(*run.board, board_cell, run.samples, run.start, result.scalar);
+    result.track = run_on(*run.board, board_cell, run.log ? run.log->samples : measurement::samples(result.recording),
+                          run.start, result.scalar);
   }
   if (run.board == nullptr || options.verify) {
-    host_sim::Track host = host_sim::run_on_host(result.cell, run.samples, run.start, result.scalar);
+    const measurement::SampleList samples =
+        run.log ? measurement::SampleList(run.log->samples) : measurement::SampleList(result.recording);
+    host_sim::Track host = host_sim::run_on_host(result.cell, samples, run.start, result.scalar);
     if (run.board == nullptr) {
       result.track = std::move(host);
     } else if (const auto d = host_sim::first_difference(host, result.track, result.scalar)) {
@@ -217,14 +218,30 @@ std::string summary(const host_sim::ReplayResult& r) {
                                              r.track.steps_per_second / 1e6, r.target, host_sim::name_of(r.scalar));
 }
 
+/// Writes the trace, if it is wanted, and returns its SHA-256.
+std::string write_trace(const ReplayOptions& options, const host_sim::ReplayResult& result) {
+  files::Sha256 hash;
+  const auto produce = [&](const files::Sink& sink) {
+    host_sim::write_trace(result, [&](std::string_view piece) {
+      hash.add(piece);
+      sink(piece);
+    });
+  };
+  if (options.trace.empty())
+    produce([](std::string_view) {});
+  else
+    write_output(options.trace, produce);
+  return hash.hex();
+}
+
 /// Returns the exit code.
 int write(const ReplayOptions& options, const ReplayRun& run) {
   const host_sim::ReplayResult& result = run.result;
-  const std::string trace = host_sim::trace_csv(result);
-  if (!options.trace.empty()) write_output(options.trace, trace);
+  const bool needed = !options.trace.empty() || !options.output.json.empty();
+  const std::string trace_sha256 = needed ? write_trace(options, result) : std::string();
   if (!options.output.report.empty()) write_output(options.output.report, reports::replay_report(result));
   if (!options.output.json.empty()) {
-    const std::string json = reports::json_of(result, files::sha256(trace));
+    const std::string json = reports::json_of(result, trace_sha256);
     write_output(options.output.json, run.cells.empty() ? json : with_cells(json, run.cells));
   }
   if (result.difference) {
@@ -235,10 +252,10 @@ int write(const ReplayOptions& options, const ReplayRun& run) {
   if (!run.cells.empty()) print_summary(options.output, cells_text(run.cells));
   if (result.verified_against) {
     const bool log = run.compared > 0;
-    print_summary(
-        options.output,
-        fmt::format("Verified: {} estimates, every bit equal {}.", log ? run.compared : result.track.words.size(),
-                    log ? "to what the firmware computed" : "on " + *result.verified_against));
+    print_summary(options.output,
+                  fmt::format("Verified: {} estimates, every bit equal {}.",
+                              log ? run.compared : result.track.rows.words().size(),
+                              log ? "to what the firmware computed" : "on " + *result.verified_against));
   }
   if (!options.output.report.empty()) print_summary(options.output, "Report: " + options.output.report);
   return 0;

@@ -61,9 +61,15 @@ void Output::set_own(const std::string& file) {
 }
 
 void write_output(const std::string& file, const std::string& text) {
-  if (file != "-") return files::write_file(file, text);
-  if (std::fwrite(text.data(), 1, text.size(), stdout) != text.size() || std::fflush(stdout) != 0)
-    refuse_standard_output();
+  write_output(file, [&](const files::Sink& sink) { sink(text); });
+}
+
+void write_output(const std::string& file, const std::function<void(const files::Sink&)>& produce) {
+  if (file != "-") return files::write_file(file, produce);
+  produce([](std::string_view piece) {
+    if (std::fwrite(piece.data(), 1, piece.size(), stdout) != piece.size()) refuse_standard_output();
+  });
+  if (std::fflush(stdout) != 0) refuse_standard_output();
 }
 
 void print_summary(const Output& output, const std::string& text) {

@@ -1,9 +1,11 @@
 // Where results go: the part that all commands do in the same way.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
+#include "files/text_file.hpp"
 #include "tool/progress.hpp"
 
 namespace bms::tool {
@@ -24,6 +26,8 @@ struct Output {
 
 /// Writes `text` to the file, or to standard output for "-". Throws BadInput when it cannot be written.
 void write_output(const std::string& file, const std::string& text);
+/// The same for a text that is produced piece by piece.
+void write_output(const std::string& file, const std::function<void(const files::Sink&)>& produce);
 
 /// Prints a summary for a person, unless --quiet is given or standard output carries a result. Throws BadInput when it
 /// cannot be printed.

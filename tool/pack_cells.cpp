@@ -20,7 +20,7 @@ std::vector<PackCell> replay_cells(const host_sim::ReplayResult& mean,
     one.scalar = mean.scalar;
     one.prior = mean.prior;
     one.initial_soc = mean.initial_soc;
-    one.track = host_sim::run_on_host(one.cell, measurement::samples(one.recording), start, one.scalar);
+    one.track = host_sim::run_on_host(one.cell, measurement::SampleList(one.recording), start, one.scalar);
     host_sim::evaluate(one);
     cells.push_back({k + 1, one.soc.final, one.soc.final_sigma, one.voltage.prediction_rmse_v});
   }
@@ -66,7 +66,7 @@ std::vector<SimulatedCell> simulate_cells(const files::CellFile& cell, const mea
   std::vector<SimulatedCell> cells;
   for (std::size_t k = 0; k < pack.cell_voltage_v.size(); ++k) {
     const measurement::Recording one = measurement::cell(pack, k);
-    const auto track = host_sim::run_on_host(cell, measurement::samples(one), {}, host_sim::ScalarKind::float64);
+    const auto track = host_sim::run_on_host(cell, measurement::SampleList(one), {}, host_sim::ScalarKind::float64);
     SimulatedCell found{k + 1, std::clamp(track.rows.back().soc - counted, 0.0, 1.0), 0, {}};
     double squares = 0, count = 0;
     for (const host_sim::SimulatedRow& row : host_sim::simulate({.cell = tables,

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "workflow/ammeter_at_rest.hpp"
 #include "workflow/ammeter_by_cell.hpp"
 
 namespace bms::workflow {
@@ -18,7 +19,7 @@ namespace {
 
 constexpr std::size_t fewest_readings = 30, fewest_values = 10, fewest_clipped = 20, fewest_episodes = 3;
 constexpr double same_reading = 0.002;  ///< of the largest: such readings are at the end of the range
-constexpr double high_reading = 0.6;    ///< of the largest: readings to compare the clipped ones with
+constexpr double high_reading = 0.8;    ///< of the largest: readings to compare the clipped ones with
 constexpr double significant = 3;       ///< standard deviations, for a claim that something is there
 constexpr double correlated_s = 60;     ///< errors of a meter are taken as correlated for so long
 constexpr double steps_of_a_gap = 5;    ///< a gap around zero of fewer steps of the reading is its resolution
@@ -114,6 +115,8 @@ void find_clipping(const measurement::Recording& r, const Readings& all, const s
                             fewest_clipped, fewest_episodes);
     return;
   }
+  // Readings a little below the end show how far the voltage or the reference is off for another reason: that grows
+  // with the current.
   std::vector<double> at_end, below;
   for (const auto& [begin, end] : stretches) {
     double sum = 0;
@@ -127,15 +130,23 @@ void find_clipping(const measurement::Recording& r, const Readings& all, const s
   }
   for (std::size_t k = 0; k < r.rows(); ++k) {
     const double share = r.current_a[k] / all.largest;
-    if (share > high_reading && share < 1 - same_reading && known(more_a[k])) below.push_back(more_a[k]);
+    if (share > high_reading && share < 1 - 2 * same_reading && known(more_a[k])) below.push_back(more_a[k] / share);
   }
   if (at_end.size() < fewest_episodes) {
     found.why = "not visible here: no voltage and no reference while the reading is at its largest";
     return;
   }
-  const Uncertain high = mean_of(at_end), low = below.size() < fewest_readings ? Uncertain{} : mean_of(below);
+  if (below.size() < fewest_readings) {
+    found.why =
+        fmt::format("not visible here: fewer than {} readings between {:.0f} and 100 % of the largest to compare with",
+                    fewest_readings, 100 * high_reading);
+    return;
+  }
+  const Uncertain high = mean_of(at_end), low = mean_of(below);
   const double beyond = high.value - low.value, std = std::hypot(high.std, low.std);
-  if (beyond / (all.largest > 0 ? std : -std) > significant) {
+  const double claimed_a = all.largest > 0 ? beyond : -beyond;
+  const double scatter_a = low.std * std::sqrt(static_cast<double>(below.size()));  // of single readings
+  if (claimed_a > significant * std && claimed_a > 2 * scatter_a) {
     found.value = {all.largest, all.step};
     ammeter.missed_a = beyond;
     found.why = fmt::format("the current goes {:.3g} +- {:.2g} A beyond it on average", std::abs(beyond), std);
@@ -200,11 +211,14 @@ std::vector<double> beyond_by_reference(const measurement::Recording& r, const A
   return more;
 }
 
-/// The same by the voltage: what is left of it over the ohmic resistance.
-std::vector<double> beyond_by_voltage(const AmmeterByCell& found, const files::CellFile& cell) {
+double mean_r0_ohm(const AmmeterByCell& found, const files::CellFile& cell) {
   double r0_ohm = 0;
   for (std::size_t k = 0; k < cell.parameters.rc.r0_ohm.size; ++k) r0_ohm += cell.parameters.rc.r0_ohm[k];
-  r0_ohm *= found.r0_times / static_cast<double>(cell.parameters.rc.r0_ohm.size);
+  return r0_ohm * found.r0_times / static_cast<double>(cell.parameters.rc.r0_ohm.size);
+}
+
+/// The same by the voltage: what is left of it over the ohmic resistance.
+std::vector<double> beyond_by_voltage(const AmmeterByCell& found, double r0_ohm) {
   std::vector<double> more(found.error_v.size());
   for (std::size_t k = 0; k < more.size(); ++k) more[k] = found.error_v[k] / r0_ohm;
   return more;
@@ -226,6 +240,17 @@ void gain_by_cell(const AmmeterByCell& found, const std::optional<double>& capac
         100 * g.value, 100 * g.std);
   else
     ammeter.gain.value = {g.value, std::hypot(g.std, *capacity_sigma)};
+}
+
+/// Without an answer by the charge: what the sensor reads at rest.
+void offset_at_rest(const measurement::Recording& recording, const files::CellFile& cell, Ammeter& ammeter) {
+  SensorFinding at_rest = reading_at_rest(recording, cell);
+  if (at_rest.value && !ammeter.dead_band_a.value)
+    ammeter.offset_a = std::move(at_rest);
+  else if (at_rest.value)
+    ammeter.offset_a.why += "; at rest a dead band may hide it";
+  else
+    ammeter.offset_a.why += "; " + at_rest.why;
 }
 
 }  // namespace
@@ -251,12 +276,16 @@ Ammeter examine_ammeter(const measurement::Recording& recording, const files::Ce
   if (found.error_v.empty())
     ammeter.clipping_a.why = found.offset_a.why;
   else
-    find_clipping(recording, all, beyond_by_voltage(found, cell), ammeter);
+    find_clipping(recording, all, beyond_by_voltage(found, mean_r0_ohm(found, cell)), ammeter);
   if (ammeter.clipping_a.value) {
     ammeter.offset_a = {{},
                         "not visible here: the readings are clipped, and the charge beyond is missing in the count"};
     ammeter.gain = ammeter.offset_a;
+  } else if (ammeter.dead_band_a.value) {
+    ammeter.offset_a = {{}, "not visible here: the charge of currents in the dead band is missing in the count"};
+    ammeter.gain = ammeter.offset_a;
   }
+  if (!ammeter.offset_a.value) offset_at_rest(recording, cell, ammeter);
   return ammeter;
 }
 

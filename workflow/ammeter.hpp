@@ -4,9 +4,10 @@
 //   reading = (1 + gain) * current + offset
 //
 // With readings of a trusted meter (current_ref_a) all four are measured. Without them the cell is the reference: the
-// charge that its voltage shows is compared with the charge that was counted. That finds the offset. A wrong gain looks
-// like another capacity, so the gain is visible only if the capacity of the cell file was measured with another
-// instrument, whose accuracy the user states.
+// charge that its voltage shows is compared with the charge that was counted. That finds the offset. If the cell file
+// is not good enough for it, the reading at rest is the offset, if no current flows then. A wrong gain looks like
+// another capacity, so the gain is visible only if the capacity of the cell file was measured with another instrument,
+// whose accuracy the user states.
 #pragma once
 
 #include <optional>

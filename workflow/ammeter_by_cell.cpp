@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "host_sim/simulation.hpp"
+#include "workflow/thinned_recording.hpp"
 
 namespace bms::workflow {
 
@@ -31,8 +32,11 @@ constexpr double soc_prior = 0.5, offset_prior_c = 0.1, gain_prior = 0.05, resis
 constexpr double relaxation_s = 3'600, ocv_correlation_soc = 0.05, plateau_soc = 0.3;
 constexpr int most_iterations = 25;
 constexpr std::size_t most_starts = 6;
-constexpr double worst_chi2 = 4;       ///< per degree of freedom: beyond it the cell file does not describe the log
-constexpr double worst_rms = 2;        ///< times what the noise model expects: the same for slow errors
+/// The cell file may be off by so many times what it states, in each block or slowly: the noise of the fit grows with
+/// it, and so do the standard deviations of the result. Beyond it the file does not describe the log.
+constexpr double worst_scale = 2;
+constexpr int scale_rounds = 3;
+constexpr std::size_t most_fit_rows = 5'000;
 constexpr double worst_gain = 0.1;     ///< beyond it the cell file has another capacity
 constexpr double same_cost = 6;        ///< two starts whose costs differ by less explain the log equally well
 constexpr double visible_share = 0.2;  ///< of the prior: an offset that is less certain is not visible
@@ -115,12 +119,16 @@ class Fit {
     information.diagonal() += prior_.cwiseInverse().cwiseAbs2();
     return information.inverse();
   }
-  double chi2_per_degree(const Values& values) {
+  /// By how much the errors at these values exceed what the cell file states: quickly (whitened) or slowly (RMS).
+  double excess(const Values& values) {
+    weigh(values);
     const Vector white = factor_.matrixL().solve(block_errors(row_errors(values)));
-    return white.squaredNorm() / std::max(1.0, static_cast<double>(blocks_.size()) - static_cast<double>(unknowns));
+    const double chi2 =
+        white.squaredNorm() / std::max(1.0, static_cast<double>(blocks_.size()) - static_cast<double>(unknowns));
+    return scale_ * std::max(std::sqrt(chi2), rms(values) / expected_rms_);
   }
-  /// RMS that the noise model expects of the block errors; after weigh().
-  double expected_rms() const { return expected_rms_; }
+  /// Standard deviations of the noise in those of the cell file.
+  void set_scale(double scale) { scale_ = scale; }
   double rms(const Values& values) const {
     const Vector e = block_errors(row_errors(values));
     return e.size() == 0 ? 0 : std::sqrt(e.squaredNorm() / static_cast<double>(e.size()));
@@ -128,10 +136,11 @@ class Fit {
   std::size_t blocks() const { return blocks_.size(); }
   const Values& prior() const { return prior_; }
 
-  std::vector<double> row_errors(const Values& v) const {
-    const auto rows = simulated(v);
+  std::vector<double> row_errors(const Values& v) const { return row_errors(v, recording_); }
+  std::vector<double> row_errors(const Values& v, const measurement::Recording& recording) const {
+    const auto rows = simulated(v, recording);
     std::vector<double> error(rows.size());
-    for (std::size_t k = 0; k < rows.size(); ++k) error[k] = recording_.voltage_v[k] - rows[k].voltage_v;
+    for (std::size_t k = 0; k < rows.size(); ++k) error[k] = recording.voltage_v[k] - rows[k].voltage_v;
     return error;
   }
 
@@ -143,7 +152,7 @@ class Fit {
     return v;
   }
 
-  std::vector<host_sim::SimulatedRow> simulated(const Values& v) const {
+  std::vector<host_sim::SimulatedRow> simulated(const Values& v, const measurement::Recording& r) const {
     auto parameters = file_.parameters;
     for (std::size_t k = 0; k < parameters.rc.soc.size; ++k) {
       parameters.rc.r0_ohm[k] *= 1 + v[r0];
@@ -151,15 +160,14 @@ class Fit {
       parameters.rc.c1_f[k] /= 1 + v[r1];
     }
     const auto tables = model::prepare<double, model::max_intervals>(parameters);
-    std::vector<double> current_a(recording_.rows());
-    for (std::size_t k = 0; k < current_a.size(); ++k)
-      current_a[k] = (recording_.current_a[k] - v[offset]) / (1 + v[gain]);
+    std::vector<double> current_a(r.rows());
+    for (std::size_t k = 0; k < current_a.size(); ++k) current_a[k] = (r.current_a[k] - v[offset]) / (1 + v[gain]);
     return host_sim::simulate({.cell = tables,
                                .capacity_ah = parameters.capacity_ah,
                                .mechanisms = file_.mechanisms,
-                               .time_s = {recording_.time_s.data(), recording_.rows()},
+                               .time_s = {r.time_s.data(), r.rows()},
                                .current_a = current_a,
-                               .temperature_c = {recording_.temperature_c.data(), recording_.temperature_c.size()},
+                               .temperature_c = {r.temperature_c.data(), r.temperature_c.size()},
                                .initial_soc = v[initial_soc]});
   }
 
@@ -228,7 +236,7 @@ class Fit {
 
   /// The noise of the blocks.
   void weigh(const Values& v) {
-    const auto rows = simulated(v);
+    const auto rows = simulated(v, recording_);
     const model::Noise& n = file_.parameters.noise;
     const auto count = static_cast<Eigen::Index>(blocks_.size());
     Matrix c(count, count);
@@ -240,6 +248,7 @@ class Fit {
       }
       c(a, a) += n.voltage_v * n.voltage_v / static_cast<double>(block.readings) + 1e-10;
     }
+    c *= scale_ * scale_;
     expected_rms_ = std::sqrt(c.diagonal().mean());
     factor_.compute(c);
   }
@@ -249,7 +258,7 @@ class Fit {
   std::vector<Block> blocks_;
   Values prior_, step_;
   Eigen::LLT<Matrix> factor_;
-  double expected_rms_ = 0;
+  double expected_rms_ = 0, scale_ = 1;
   bool exact_gain_ = false;
 };
 
@@ -287,17 +296,26 @@ std::vector<Values> starts_of(const Fit& fit) {
   return starts;
 }
 
-/// Results of several starts, the best first.
+/// Results of several starts, the best first, under the noise that the smallest residual shows.
 std::vector<Fit::Result> results_of(Fit& fit) {
   std::vector<Fit::Result> results;
   for (const Values& start : starts_of(fit)) results.push_back(fit.from(start));
-  const auto by_cost = [](const Fit::Result& a, const Fit::Result& b) { return a.cost < b.cost; };
+  const auto smallest = [&] {
+    return std::min_element(results.begin(), results.end(),
+                            [&](const auto& a, const auto& b) { return fit.rms(a.values) < fit.rms(b.values); })
+        ->values;
+  };
+  double scale = 1;
+  for (int k = 0; k < scale_rounds; ++k) {
+    const double wanted = std::max(1.0, fit.excess(smallest()));
+    if (wanted < 1.05 * scale || wanted > worst_scale) break;
+    fit.set_scale(scale = wanted);
+    for (Fit::Result& r : results) r = fit.from(r.values);
+  }
   // the noise depends on the place; the smallest residual decides under which noise all of them are compared
-  const Values at = std::min_element(results.begin(), results.end(), [&](const auto& a, const auto& b) {
-                      return fit.rms(a.values) < fit.rms(b.values);
-                    })->values;
+  const Values at = smallest();
   for (Fit::Result& r : results) r.cost = fit.cost_with_noise_at(at, r.values);
-  std::sort(results.begin(), results.end(), by_cost);
+  std::sort(results.begin(), results.end(), [](const auto& a, const auto& b) { return a.cost < b.cost; });
   return results;
 }
 
@@ -305,7 +323,8 @@ std::vector<Fit::Result> results_of(Fit& fit) {
 
 AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const files::CellFile& cell) {
   AmmeterByCell found;
-  Fit fit(recording, cell);
+  const measurement::Recording rows = thinned(recording, most_fit_rows);
+  Fit fit(rows, cell);
   if (fit.blocks() < fewest_blocks) {
     found.offset_a.why = "the log is too short; some hours with a rest would show it";
     return found;
@@ -313,10 +332,9 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   const auto results = results_of(fit);
   const Values& best = results.front().values;
   const auto covariance = fit.covariance(best);
-  const double chi2 = fit.chi2_per_degree(best), widened = std::sqrt(std::max(1.0, chi2));
-  const auto std_of = [&](Unknown u) { return widened * std::sqrt(covariance(u, u)); };
+  const auto std_of = [&](Unknown u) { return std::sqrt(covariance(u, u)); };
   found.residual_v = fit.rms(best);
-  found.error_v = fit.row_errors(best);
+  found.error_v = fit.row_errors(best, recording);
   found.r0_times = 1 + best[r0];
   found.gain_and_capacity = {best[gain], std_of(gain)};
   found.gain_visible = std_of(gain) < 0.5 * gain_prior;
@@ -328,7 +346,7 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   const auto other = std::find_if(results.begin(), results.end(), [&](const Fit::Result& r) {
     return r.cost < results.front().cost + same_cost && std::abs(r.values[offset] - best[offset]) > 3 * offset_a.std;
   });
-  if (chi2 > worst_chi2 || found.residual_v > worst_rms * fit.expected_rms())
+  if (fit.excess(best) > worst_scale)
     found.offset_a.why = fmt::format(
         "the cell file does not describe this log, it is off by {:.1f} mV RMS; "
         "bms diagnose finds why",

@@ -40,7 +40,7 @@ constexpr std::array all_names = {
     Names{Quantity::temperature,
           "|temperature|temp|cell temperature|temp 1|temperature 1|t1|temperature t1|surface temperature t1|"
           "surface temperature|aux temperature 1|aux temperature|temperatur|ambient temperature|"},
-    Names{Quantity::pack_voltage, "|pack voltage|total voltage|stack voltage|"},
+    Names{Quantity::pack_voltage, "|pack voltage|total voltage|stack voltage|sum voltage|sumvoltage|bus voltage|"},
     Names{Quantity::soc_ref, "|soc ref|"},
     Names{Quantity::current_ref, "|current ref|"},
     Names{Quantity::voltage_ref, "|voltage ref|"},

@@ -73,6 +73,16 @@ class HeaderFinder {
     return std::nullopt;
   }
 
+  /// How many of time, current and voltage the line seems to name, whatever their units.
+  int likeness(std::string_view line) const {
+    TableLayout layout;
+    for (const std::string_view part : split(line, separator_of(line, options_))) layout.headings.emplace_back(part);
+    int named = 0;
+    for (const Quantity quantity : {Quantity::time, Quantity::current, Quantity::voltage})
+      named += heading_that_is(layout, quantity).empty() ? 0 : 1;
+    return named;
+  }
+
   /// Says what the line lacks as a header.
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
     for (const auto& [target, column] : maps_) {
@@ -84,20 +94,45 @@ class HeaderFinder {
     layout.separator = separator_of(line, options_);
     for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
     own_names(layout);
-    const char* missing = "voltage_v";
-    if (layout.find(Quantity::current) == nullptr) missing = "current_a";
-    if (layout.find(Quantity::time) == nullptr) missing = "time_s";
+    std::optional<Quantity> missing;
+    for (const Quantity quantity : {Quantity::time, Quantity::current, Quantity::voltage}) {
+      const std::string heading = heading_that_is(layout, quantity);
+      if (missing || (!heading.empty() && quantity == Quantity::time)) continue;
+      if (heading.empty())
+        missing = quantity;
+      else if (const Heading parts = heading_of(heading); !target_of(heading) && parts.unit.empty())
+        throw BadInput(path_, number,
+                       fmt::format("column {} states no unit, expected --unit {}=UNIT with one of: {}",
+                                   in_quotes(heading), name_of({quantity, 0}), units_of(quantity)));
+    }
+    const std::string name = name_of({missing.value_or(Quantity::voltage), 0});
     throw BadInput(path_, number,
                    fmt::format("no column '{}' in {}, expected a header with time_s, current_a, voltage_v, or with "
                                "names and units that are known; --map {}=COLUMN names it",
-                               missing, in_quotes(line), missing));
+                               name, in_quotes(line), name));
   }
 
  private:
+  /// The heading that names this quantity, with or without a unit; a pack's or a cell's voltage is a voltage.
+  static std::string heading_that_is(const TableLayout& layout, Quantity quantity) {
+    for (const std::string& heading : layout.headings) {
+      const std::string base = heading_of(heading).base;
+      const auto is = [&](Quantity q) { return rank_of(q, base) >= 0 || target_of(heading) == Target{q, 0}; };
+      if (is(quantity)) return heading;
+      if (quantity != Quantity::voltage) continue;
+      if (is(Quantity::pack_voltage) || cell_number(Quantity::cell_voltage, base) > 0) return heading;
+    }
+    return {};
+  }
+
   /// Returns false if the line lacks a column that the user named.
   bool take_maps(TableLayout& layout) const {
     for (const auto& [target, column] : maps_) {
-      const auto at = std::find(layout.headings.begin(), layout.headings.end(), column);
+      auto at = std::find(layout.headings.begin(), layout.headings.end(), column);
+      if (at == layout.headings.end()) {  // the name without its unit
+        at = std::find_if(layout.headings.begin(), layout.headings.end(),
+                          [&](const std::string& heading) { return heading_of(heading).base == normalised(column); });
+      }
       if (at == layout.headings.end()) return false;
       add(layout, static_cast<std::size_t>(at - layout.headings.begin()), target);
     }
@@ -119,14 +154,17 @@ class HeaderFinder {
                        [&](const SourceColumn& c) { return c.target == target; });
   }
 
+  static bool uses(const TableLayout& layout, std::size_t index) {
+    return std::any_of(layout.columns.begin(), layout.columns.end(),
+                       [&](const SourceColumn& c) { return c.index == index; });
+  }
+
   /// Columns with the project's own names. Returns true if no other is needed.
   bool own_names(TableLayout& layout) const {
     const bool nothing_mapped = layout.columns.empty();
     for (std::size_t k = 0; k < layout.headings.size(); ++k) {
       const auto target = target_of(layout.headings[k]);
-      const bool used = std::any_of(layout.columns.begin(), layout.columns.end(),
-                                    [&](const SourceColumn& c) { return c.index == k; });
-      if (!target || target->quantity == Quantity::state || (used && !nothing_mapped)) continue;
+      if (!target || target->quantity == Quantity::state || (uses(layout, k) && !nothing_mapped)) continue;
       if (!has(layout, *target)) {
         add(layout, k, *target);
       } else if (nothing_mapped) {
@@ -174,7 +212,7 @@ class HeaderFinder {
       std::size_t at = 0;
       for (std::size_t k = 0; k < layout.headings.size(); ++k) {
         const Heading heading = heading_of(layout.headings[k]);
-        const int rank = rank_of(quantity, heading.base);
+        const int rank = uses(layout, k) ? -1 : rank_of(quantity, heading.base);
         if (rank < 0 || (best >= 0 && rank >= best) || !unit_known(layout, quantity, heading)) continue;
         best = rank;
         at = k;
@@ -185,9 +223,7 @@ class HeaderFinder {
       for (std::size_t k = 0; k < layout.headings.size(); ++k) {
         const Heading heading = heading_of(layout.headings[k]);
         const Target target{quantity, cell_number(quantity, heading.base)};
-        const bool used = std::any_of(layout.columns.begin(), layout.columns.end(),
-                                      [&](const SourceColumn& c) { return c.index == k; });
-        if (target.number > 0 && !used && !has(layout, target) && scale_of(quantity, heading.unit))
+        if (target.number > 0 && !uses(layout, k) && !has(layout, target) && scale_of(quantity, heading.unit))
           add(layout, k, target);
       }
     }
@@ -271,11 +307,15 @@ std::size_t TableLayout::count(Quantity quantity) const {
 namespace {
 
 /// Headings with the units of the row below, as one line: "Time" and "s" are "Time (s)". Empty if the row has no units.
-std::string with_units(std::string_view headings, std::string_view units, char separator) {
-  const std::vector<std::string_view> names = split(headings, separator), below = split(units, separator);
+/// above: the row above the headings, whose first field may name the time of all devices in the headings.
+std::string with_units(std::string_view above, std::string_view headings, std::string_view units, char separator) {
+  std::vector<std::string_view> names = split(headings, separator);
+  const std::vector<std::string_view> below = split(units, separator), first = split(above, separator);
   if (names.size() != below.size()) return {};
+  const bool dated = rank_of(Quantity::time, heading_of(first[0]).base) >= 0 && first.size() == names.size();
+  if (dated) names[0] = first[0];
   std::string line;
-  bool time = false;
+  bool time = dated;
   for (std::size_t k = 0; k < names.size(); ++k) {
     const bool number = std::any_of(below[k].begin(), below[k].end(), [](char c) { return c >= '0' && c <= '9'; });
     if (number) return {};
@@ -290,7 +330,8 @@ std::string with_units(std::string_view headings, std::string_view units, char s
 
 TableLayout find_header(TextLines& lines, const std::string& path, bool voltage, const ReadOptions& options) {
   const HeaderFinder finder(path, voltage, options);
-  std::string first, previous;
+  std::string first, previous, before;
+  int most_named = 0;
   std::size_t first_number = 0;
   std::string_view line;
   for (std::size_t k = 0; k < most_preamble_lines && lines.next(line);) {
@@ -298,14 +339,17 @@ TableLayout find_header(TextLines& lines, const std::string& path, bool voltage,
     if (content.empty()) continue;
     if (auto layout = finder.header(content.front() == '#' ? std::string_view{} : line)) return *layout;
     if (content.front() == '~' || content.front() == '#') continue;
-    const std::string both = with_units(previous, line, separator_of(line, options));
+    const std::string both = with_units(before, previous, line, separator_of(line, options));
     if (!both.empty()) {
       if (auto layout = finder.header(both)) return *layout;
     }
+    before = previous;
     previous = line;
-    if (first.empty()) {
+    const int named = finder.likeness(line);
+    if (first.empty() || named > most_named) {  // the line that is most like a header is the one to complain about
       first = line;
       first_number = lines.number();
+      most_named = named;
     }
     ++k;
   }

@@ -202,6 +202,24 @@ std::string spaced(const std::array<unsigned, 4>& b) {
 
 const char* const bus = "--dbc bus.dbc --map current_a=PackCurrent --map voltage_v=CellVoltage";
 
+/// Devices, names and units in a row each; the time only in the first.
+std::string victron() {
+  return lines("timestamp,Battery Monitor [288],,\nEurope/Amsterdam (+01:00),Voltage,Current,Battery state\n,V,A,",
+               [](std::size_t k, const Row& r) {
+                 return fmt::format("2025-03-11 08:{:02}:{:02},{:.2f},{:.3f},Idle", k / 60, k % 60, 16 * r.voltage_v,
+                                    r.current_a);
+               });
+}
+
+/// A preamble, names without units, and units next to the numbers.
+std::string daly() {
+  return lines("BMS Monitor V1.2.9,,,\nSN:16S100A,,,\n\nNo.,DateTime,SumVoltage,Current",
+               [](std::size_t k, const Row& r) {
+                 return fmt::format("{},2025-03-11 08:{:02}:{:02},{:.1f}V,{:.1f}A", k + 1, k / 60, k % 60,
+                                    16 * r.voltage_v, r.current_a);
+               });
+}
+
 void add_tables(std::vector<Sample>& all) {
   all.push_back({"the project's own CSV", "own.csv", plain("time_s,current_a,voltage_v"), "", Answer::read, ""});
   all.push_back({"own names, ';' and decimal comma", "comma.csv",
@@ -219,8 +237,8 @@ void add_tables(std::vector<Sample>& all) {
   all.push_back({"a row of units below own names", "units_row2.csv",
                  plain("time_s,current_a,voltage_v\ns,mA,V", ",", 1, 1e3), "", Answer::read,
                  "current_a from 'current_a' in mA"});
-  all.push_back(
-      {"names without units", "names.csv", plain("t,i_batt,u_cell"), "", Answer::refused, "no column 'time_s'"});
+  all.push_back({"names without units", "names.csv", plain("t,i_batt,u_cell"), "", Answer::refused,
+                 "column 'i_batt' states no unit, expected --unit current_a=UNIT"});
   all.push_back({"the same, named by the user", "mapped.csv", plain("t,i_batt,u_cell", ",", 1e3, 1, 1e3),
                  "--map time_s=t --map current_a=i_batt --map voltage_v=u_cell --unit time_s=ms --unit voltage_v=mV",
                  Answer::read, "current_a from 'i_batt'"});
@@ -303,6 +321,11 @@ void add_impossible(std::vector<Sample>& all) {
   all.push_back({"four cells, names of a logger", "cells2.csv",
                  pack("Time (s),Pack Current (A),Cell 1 (V),Cell 2 (V),Cell 3 (V),Cell 4 (V)", 4, false), "",
                  Answer::read, "v_4 from 'Cell 4 (V)'"});
+  all.push_back({"Victron VRM, three header rows", "vrm.csv", victron(), "--map pack_voltage_v=Voltage --series 16",
+                 Answer::read, "time_s from 'timestamp' as h:mm:ss or a date; pack_voltage_v from 'Voltage (V)'",
+                 1e-3});
+  all.push_back({"Daly, a preamble and names without units", "daly.csv", daly(), "", Answer::refused,
+                 "daly.csv:4: column 'Current' states no unit, expected --unit current_a=UNIT"});
   all.push_back(
       {"state of charge in percent", "percent.csv",
        lines("time_s,current_a,voltage_v,soc_ref",

@@ -65,9 +65,10 @@ class Export {
       const char* const step = current_a == 0 ? "Rest" : "CC";
       out_ << fmt::format("{},{},{}:{:02}:{:02},{:.3f},{:.4f}\n", ++point_, step, s / 3'600, s / 60 % 60, s % 60,
                           current_a, cell_.voltage());
+      soc_.push_back(cell_.soc());
     }
   }
-  double soc() const { return cell_.soc(); }
+  const std::vector<double>& soc() const { return soc_; }
 
  private:
   bool inside(double current_a) const {
@@ -78,10 +79,11 @@ class Export {
   double size_;
   Truth cell_;
   int point_ = 0;
+  std::vector<double> soc_;  ///< of each row
 };
 
-/// A slow discharge and charge in one file, a pulse test, and a day in a truck that ends at the returned SOC.
-double write_exports(const std::filesystem::path& folder, double size = 1) {
+/// A slow discharge and charge in one file, a pulse test, and a day in a truck, whose true SOC is returned.
+std::vector<double> write_exports(const std::filesystem::path& folder, double size = 1) {
   Export slow(folder / "slow.csv", 1, size);
   slow.run(0, 3'600, 60);
   slow.run(-5, 30 * 3'600, 60);
@@ -107,6 +109,20 @@ double write_exports(const std::filesystem::path& folder, double size = 1) {
     truck.run(0, 40, 1);
   }
   return truck.soc();
+}
+
+/// RMS of the SOC in a trace of bms replay.
+double soc_rms(const std::filesystem::path& trace, const std::vector<double>& truth) {
+  std::ifstream in(trace);
+  double squares = 0;
+  std::size_t rows = 0;
+  std::string line;
+  for (std::getline(in, line); std::getline(in, line); ++rows) {
+    const double error = std::stod(line.substr(line.find(',') + 1)) - truth.at(rows);
+    squares += error * error;
+  }
+  EXPECT_EQ(rows, truth.size());
+  return std::sqrt(squares / static_cast<double>(rows));
 }
 
 /// A command of the page with what it prints.
@@ -167,11 +183,31 @@ TEST_F(OwnCell, EveryCommandOfThePagePrintsWhatThePageShows) {
   if (write) std::ofstream(page_path_) << page;
 }
 
+/// Without commands and what they print.
+TEST_F(OwnCell, NoStepOfThePageHasMoreThanEightLinesOfText) {
+  std::istringstream page(content(page_path_));
+  std::string step;
+  int lines = 0, steps = 0;
+  bool fenced = false;
+  for (std::string line; std::getline(page, line);) {
+    if (line.starts_with("## ")) {
+      step = line;
+      lines = 0;
+      ++steps;
+    }
+    if (line.starts_with("```")) fenced = !fenced;
+    if (!fenced && !line.empty() && !line.starts_with("```") && !line.starts_with("#")) ++lines;
+    EXPECT_LE(lines, 8) << step;
+  }
+  EXPECT_GE(steps, 5);
+}
+
 TEST_F(OwnCell, TheCellIsFoundAndItsEstimatesAreRight) {
-  const double end_soc = write_exports(folder_.path());
+  const std::vector<double> true_soc = write_exports(folder_.path());
   for (const Step& step : steps_of(content(page_path_))) {
     if (step.command.find(" identify ") != std::string::npos || step.command.find(" replay ") != std::string::npos)
-      output_of(step.command + " --json " + (step.command.find(" replay ") != std::string::npos ? "r.json" : "i.json"),
+      output_of(step.command + (step.command.find(" replay ") != std::string::npos ? " --trace t.csv --json r.json"
+                                                                                   : " --json i.json"),
                 folder_.path());
   }
   const json identified = json::parse(content(folder_.path() / "i.json"));
@@ -185,7 +221,10 @@ TEST_F(OwnCell, TheCellIsFoundAndItsEstimatesAreRight) {
     EXPECT_FALSE(p["at_bound"]) << p;
   }
   const json replayed = json::parse(content(folder_.path() / "r.json"));
-  EXPECT_NEAR(replayed["soc"]["final"], end_soc, 0.01);
+  EXPECT_NEAR(replayed["soc"]["final"], true_soc.back(), 0.01);
+  const double rms = soc_rms(folder_.path() / "t.csv", true_soc);
+  EXPECT_LT(rms, 0.01);
+  RecordProperty("soc_rms_percent", fmt::format("{:.2f}", 100 * rms));
   EXPECT_TRUE(replayed["reliable"]);
   const std::string cell = content(folder_.path() / "my_cell.toml");
   EXPECT_THAT(cell, HasSubstr("discharge_current_max_a = 200"));
@@ -193,7 +232,8 @@ TEST_F(OwnCell, TheCellIsFoundAndItsEstimatesAreRight) {
 }
 
 TEST_F(OwnCell, ACellOf280AhMeetsNoBound) {
-  const double size = 2.8, end_soc = write_exports(folder_.path(), size);
+  constexpr double size = 2.8;
+  const std::vector<double> true_soc = write_exports(folder_.path(), size);
   const std::string in = folder_.path().string() + "/";
   const ToolRun run = run_tool("identify --ocv " + in + "slow.csv --recording " + in +
                                "hppc.csv --initial-soc 1 --voltage-min-v 2.5 --voltage-max-v 3.65 "
@@ -206,15 +246,16 @@ TEST_F(OwnCell, ACellOf280AhMeetsNoBound) {
       EXPECT_NEAR(p["value"], size * Truth::c1_f, 0.3 * size * Truth::c1_f);
     }
   }
-  const ToolRun replayed =
-      run_tool("replay " + in + "truck.csv --cell " + in + "large.toml --initial-soc 0.95 --json -");
+  const ToolRun replayed = run_tool("replay " + in + "truck.csv --cell " + in +
+                                    "large.toml --initial-soc 0.95 --trace " + in + "t.csv --json -");
   ASSERT_EQ(replayed.exit_code, 0) << replayed.err;
-  EXPECT_NEAR(json::parse(replayed.out)["soc"]["final"], end_soc, 0.01);
+  EXPECT_NEAR(json::parse(replayed.out)["soc"]["final"], true_soc.back(), 0.01);
+  EXPECT_LT(soc_rms(in + "t.csv", true_soc), 0.01);
   EXPECT_THAT(content(in + "large.toml"), HasSubstr("discharge_current_max_a = 560"));
 }
 
 TEST_F(OwnCell, WithoutASlowTestTheRestsGiveTheOcv) {
-  const double end_soc = write_exports(folder_.path());
+  const double end_soc = write_exports(folder_.path()).back();
   const std::string in = folder_.path().string() + "/";
   const ToolRun run = run_tool("identify --recording " + in +
                                "hppc.csv --capacity-ah 100 --initial-soc 1 "

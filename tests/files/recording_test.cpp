@@ -139,7 +139,7 @@ TEST(Recording, RejectsFilesThatAreNotRecordings) {
               HasSubstr("not a text file"));
   EXPECT_THAT(refusal("\x89PNG\r\n\x1a\n"), HasSubstr("no column 'time_s'"));
   EXPECT_THAT(refusal("time_s,current_a\n0,0\n"), HasSubstr("no column 'voltage_v'"));
-  EXPECT_THAT(refusal("t,i,v\n" + rows()), HasSubstr("no column 'time_s'"));
+  EXPECT_THAT(refusal("t,i,v\n" + rows()), HasSubstr("column 'i' states no unit, expected --unit current_a=UNIT"));
   EXPECT_THAT(refusal("time_s,current_a,current_a,voltage_v\n"), HasSubstr("twice"));
   EXPECT_THAT(refusal(rows()), HasSubstr("no column"));
 }

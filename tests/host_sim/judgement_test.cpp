@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -71,7 +72,9 @@ TEST(Judgement, ADeadVoltageIsADoubt) {
 
 TEST(Judgement, AnEstimateThatIsNotANumberIsAFault) {
   ReplayResult result = replayed([](int, double&, double&, double&) {});
-  result.track.rows[17].soc_sigma = std::nan("");
+  auto words = result.track.rows.words();
+  words[17][1] = std::bit_cast<std::uint32_t>(std::numeric_limits<float>::quiet_NaN());
+  result.track.rows = Estimates(words, ScalarKind::float32);
   EXPECT_THROW(judge(result), std::runtime_error);
 }
 

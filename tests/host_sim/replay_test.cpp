@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "files/recording.hpp"
+#include "host_sim/stepper.hpp"
 
 namespace bms::host_sim {
 namespace {
@@ -50,31 +51,51 @@ TEST(ReplayOfTheShift, FixedPointIsWithin1PercentOfDouble) {
 }
 
 TEST(Replay, ADifferenceOfOneBitIsFoundAndNamed) {
-  Track a;
-  a.words.assign(100, {1, 2, 3, 4, 5});
-  Track b = a;
-  EXPECT_FALSE(first_difference(a, b, ScalarKind::float32).has_value());
-  b.words[41][1] ^= 1;
-  b.words[70][0] ^= 1;
-  const auto d = first_difference(a, b, ScalarKind::float32);
+  const auto track = [](const std::vector<estimator::EstimateWords>& words) {
+    Track of_words;
+    of_words.rows = Estimates(words, ScalarKind::float32);
+    return of_words;
+  };
+  const std::vector<estimator::EstimateWords> words(100, {1, 2, 3, 4, 5});
+  const Track a = track(words);
+  EXPECT_FALSE(first_difference(a, track(words), ScalarKind::float32).has_value());
+  auto others = words;
+  others[41][1] ^= 1;
+  others[70][0] ^= 1;
+  const auto d = first_difference(a, track(others), ScalarKind::float32);
   ASSERT_TRUE(d.has_value());
   EXPECT_EQ(d->sample, 41U);
   EXPECT_EQ(d->field, "soc_sigma");
-  b.words = a.words;
-  b.words.pop_back();
-  EXPECT_EQ(first_difference(a, b, ScalarKind::float32)->field, "number of estimates");
+  others = words;
+  others.pop_back();
+  EXPECT_EQ(first_difference(a, track(others), ScalarKind::float32)->field, "number of estimates");
 }
 
-TEST(Replay, WordsOfABoardAreTheNumbersOfTheHost) {
-  for (const ScalarKind scalar : {ScalarKind::float32, ScalarKind::fixed}) {
-    const auto r = replayed(SocPrior{0.9}, scalar);
-    const auto rows = rows_of(r.track.words, scalar);
-    for (std::size_t k = 0; k < rows.size(); k += 997) {
-      EXPECT_EQ(rows[k].soc, r.track.rows[k].soc);
-      EXPECT_EQ(rows[k].soc_sigma, r.track.rows[k].soc_sigma);
-      EXPECT_EQ(rows[k].v_rc_v, r.track.rows[k].v_rc_v);
-      EXPECT_EQ(rows[k].voltage_predicted_v, r.track.rows[k].voltage_predicted_v);
-    }
+/// The estimator itself, sample by sample.
+TEST(Replay, RowsAreTheNumbersOfTheEstimator) {
+  const auto r = replayed(SocPrior{0.9});
+  const auto stepper = make_stepper(r.cell, starting_point(SocPrior{0.9}));
+  const auto samples = measurement::samples(r.recording);
+  ASSERT_GT(samples.size(), 10'000U) << "more than one block";
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const EstimateRow e = stepper->step(samples[k]), row = r.track.rows[k];
+    ASSERT_EQ(row.soc, e.soc) << k;
+    ASSERT_EQ(row.soc_sigma, e.soc_sigma) << k;
+    ASSERT_EQ(row.v_rc_v, e.v_rc_v) << k;
+    ASSERT_EQ(row.voltage_predicted_v, e.voltage_predicted_v) << k;
+    ASSERT_EQ(row.flags, e.flags) << k;
+    ASSERT_EQ(r.track.rows.flags(k), e.flags) << k;
+  }
+}
+
+TEST(Replay, RowsOfFixedPointHave27BitsAfterThePoint) {
+  const auto r = replayed(SocPrior{0.9}, ScalarKind::fixed);
+  for (std::size_t k = 0; k < r.track.rows.size(); k += 997) {
+    const auto word = [&](std::size_t w) {
+      return static_cast<std::int32_t>(r.track.rows.words()[k][w]) / 134217728.0;
+    };
+    EXPECT_EQ(r.track.rows[k].soc, word(0));
+    EXPECT_EQ(r.track.rows[k].voltage_predicted_v, word(3));
   }
 }
 
@@ -93,6 +114,14 @@ TEST(Replay, TraceHasARowForEverySampleAndTheDocumentedColumns) {
   EXPECT_TRUE(csv.starts_with("time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,flags\n"));
   EXPECT_EQ(static_cast<std::size_t>(std::count(csv.begin(), csv.end(), '\n')), r.recording.rows() + 1);
   EXPECT_EQ(csv, trace_csv(replayed(std::nullopt)));
+  files::Sha256 hash;
+  std::size_t pieces = 0;
+  write_trace(r, [&](std::string_view piece) {
+    hash.add(piece);
+    ++pieces;
+  });
+  EXPECT_GT(pieces, 1U);
+  EXPECT_EQ(hash.hex(), files::sha256(csv));
 }
 
 }  // namespace

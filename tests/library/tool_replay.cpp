@@ -14,7 +14,7 @@ std::vector<ReplayedSample> tool_replay(const std::string& cell, std::optional<s
   std::vector<ReplayedSample> rows;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const measurement::Sample& s = samples[k];
-    rows.push_back({s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc, track.words[k]});
+    rows.push_back({s.time_us, s.current_ua, s.voltage_uv, s.temperature_cdegc, track.rows.words()[k]});
   }
   return rows;
 }

@@ -11,9 +11,11 @@
 #   python        pip install --no-build-isolation with Debian's packages; the tests of the module
 #
 # FOLDER is made once by debootstrap, from this machine's package sources; each way works on a copy. package comes
-# first: the others use its package from FOLDER. Prints seconds of each step. Needs root and debootstrap.
+# first: the others use its package from FOLDER. Prints the seconds of each step, also those of all processors
+# together, which depend less on other load. CMAKE_BUILD_PARALLEL_LEVEL limits the processes of a build. Needs root
+# and debootstrap.
 set -euo pipefail
-[ $# -eq 2 ] || { sed -n '2,15s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -eq 2 ] || { sed -n '2,17s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 project=$(cd "$(dirname "$0")/../.." && pwd)
 folder=$(realpath -m "$1") way=$2
 base=$folder/bare deb=$folder/greybox-bms.deb
@@ -69,13 +71,12 @@ fresh() {
 
 # step NAME: runs the commands of standard input in the root, in /opt/project
 step() {
-  local start=$SECONDS name=$1
+  local name=$1 TIMEFORMAT="$way: $1: %0R s, processor %0U s, system %0S s"
   # shellcheck disable=SC2046
-  env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
-    $(env | grep -iE '^(https?_proxy|no_proxy|SSL_CERT_FILE)=' || true) \
-    chroot "$root" bash -c 'cd /opt/project && set -euo pipefail && . /dev/stdin' >"$folder/$way.log" 2>&1 ||
+  { time env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root TERM=dumb LANG=C.UTF-8 DEBIAN_FRONTEND=noninteractive \
+    $(env | grep -iE '^(https?_proxy|no_proxy|SSL_CERT_FILE|CMAKE_BUILD_PARALLEL_LEVEL)=' || true) \
+    chroot "$root" bash -c 'cd /opt/project && set -euo pipefail && . /dev/stdin' >"$folder/$way.log" 2>&1; } 2>&1 ||
     { tail -20 "$folder/$way.log" >&2; say "$way: $name failed, its output is $folder/$way.log"; exit 1; }
-  echo "$way: $name: $((SECONDS - start)) s"
 }
 
 # packages NAME...: installs them in the root

@@ -97,6 +97,49 @@ TEST(Ammeter, ClippingIsFoundByTheVoltage) {
   EXPECT_FALSE(examine_ammeter(clean, table9(), {}).clipping_a.value);
 }
 
+TEST(Ammeter, ConstantPulsesOfACellWithAnotherResistanceAreNotClipped) {
+  auto log = shift({}, 2, 6, 1);
+  for (std::size_t k = 0; k < log.rows(); ++k) {
+    if (k % 600 >= 60) continue;
+    log.voltage_v.edit()[k] -= 0.03 * (8 + log.current_a[k]);
+    log.current_a.edit()[k] = -8;
+  }
+  const Ammeter a = examine_ammeter(log, table9(), {});
+  EXPECT_FALSE(a.clipping_a.value) << a.clipping_a.why;
+}
+
+/// Three rests of ten minutes between loads; rest_a: what is read then.
+measurement::Recording with_rests(const std::vector<double>& rest_a) {
+  measurement::Recording r;
+  for (std::size_t rest = 0; rest < rest_a.size(); ++rest) {
+    for (int k = 0; k < 1'200; ++k) {
+      r.time_s.edit().push_back(static_cast<double>(r.rows()));
+      r.current_a.edit().push_back(k < 600 ? rest_a[rest] + 0.002 * (k % 3 - 1) : -2.0 - 0.01 * (k % 50));
+      r.voltage_v.edit().push_back(3.0 + 0.01 * (k % 7));  // no cell file describes it
+    }
+  }
+  return r;
+}
+
+TEST(Ammeter, TheReadingAtRestIsTheOffsetIfNoCurrentFlowsThen) {
+  const Ammeter a = examine_ammeter(with_rests({-0.10, -0.11, -0.09}), table9(), {});
+  ASSERT_TRUE(a.offset_a.value) << a.offset_a.why;
+  EXPECT_NEAR(a.offset_a.value->value, -0.1, 2 * a.offset_a.value->std);
+  EXPECT_GE(a.offset_a.value->std, 0.01) << "it drifts between the rests";
+  EXPECT_THAT(a.offset_a.why, HasSubstr("if no current flows during the 30 minutes of rest"));
+}
+
+TEST(Ammeter, RestsThatDifferAreLoadsAndExactZerosProveNothing) {
+  const Ammeter loads = examine_ammeter(with_rests({-0.02, -0.3, -0.02}), table9(), {});
+  EXPECT_FALSE(loads.offset_a.value);
+  EXPECT_THAT(loads.offset_a.why, HasSubstr("a load is connected at some rests"));
+  auto zeros = with_rests({0, 0, 0});
+  for (double& a : zeros.current_a.edit()) a = std::abs(a) < 0.01 ? 0 : a;
+  const Ammeter zero = examine_ammeter(zeros, table9(), {});
+  EXPECT_FALSE(zero.offset_a.value);
+  EXPECT_THAT(zero.offset_a.why, HasSubstr("exactly 0"));
+}
+
 /// Ten minutes of slow triangles from -20 to 20 A with a trusted meter.
 measurement::Recording meter_check(const SensorErrors& errors) {
   measurement::Recording r;

@@ -1,0 +1,84 @@
+#include "workflow/ammeter_at_rest.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace bms::workflow {
+
+namespace {
+
+constexpr double rest_c = 0.1;        ///< a larger reading is a load, in capacities per hour
+constexpr double constant_c = 0.005;  ///< readings of a rest are that close to their mean
+constexpr double noise_sigmas = 4;    ///< or that close in standard deviations of the cell file's noise
+constexpr double shortest_rest_s = 120;
+constexpr double longest_part_s = 600;  ///< a longer rest counts as several, which show the drift of the sensor
+constexpr std::size_t fewest_rows = 5, fewest_rests = 3;
+
+struct Rest {
+  double mean_a = 0, duration_s = 0;
+  bool all_zero = true;
+};
+
+/// Stretches of the recording whose readings stay near their mean.
+std::vector<Rest> rests_of(const measurement::Recording& r, double small_a, double band_a) {
+  std::vector<Rest> rests;
+  for (std::size_t first = 0; first < r.rows();) {
+    double sum_a = 0;
+    bool all_zero = true;
+    std::size_t k = first;
+    for (; k < r.rows(); ++k) {
+      const double a = r.current_a[k];
+      if (!(std::abs(a) < small_a)) break;  // or missing
+      if (r.time_s[k] - r.time_s[first] > longest_part_s) break;
+      if (k > first && std::abs(a - sum_a / static_cast<double>(k - first)) > band_a) break;
+      sum_a += a;
+      all_zero = all_zero && a == 0;
+    }
+    const double duration_s = k > first ? r.time_s[k - 1] - r.time_s[first] : 0;
+    if (k >= first + fewest_rows && duration_s >= shortest_rest_s)
+      rests.push_back({sum_a / static_cast<double>(k - first), duration_s, all_zero});
+    first = std::max(k, first + 1);
+  }
+  return rests;
+}
+
+}  // namespace
+
+SensorFinding reading_at_rest(const measurement::Recording& r, const files::CellFile& cell) {
+  SensorFinding found;
+  const double capacity_ah = cell.parameters.capacity_ah;
+  const double band_a = std::max(constant_c * capacity_ah, noise_sigmas * cell.parameters.noise.current_a);
+  const std::vector<Rest> rests = rests_of(r, rest_c * capacity_ah, band_a);
+  if (rests.size() < fewest_rests) {
+    found.why = "half an hour of rest in which nothing is connected would show it";
+    return found;
+  }
+  double minutes = 0;
+  for (const Rest& rest : rests) minutes += rest.duration_s / 60;
+  if (std::all_of(rests.begin(), rests.end(), [](const Rest& rest) { return rest.all_zero; })) {
+    found.why = fmt::format("during {:.0f} minutes of rest it reads exactly 0, which is right or written by the device",
+                            minutes);
+    return found;
+  }
+  std::vector<double> means;
+  for (const Rest& rest : rests) means.push_back(rest.mean_a);
+  std::sort(means.begin(), means.end());
+  if (means.back() - means.front() > 2 * band_a) {
+    found.why = fmt::format("its reading at rest differs, {:.3f} to {:.3f} A: a load is connected at some rests",
+                            means.front(), means.back());
+    return found;
+  }
+  double sum = 0, squares = 0;
+  for (const double a : means) sum += a;
+  const auto count = static_cast<double>(means.size());
+  for (const double a : means) squares += (a - sum / count) * (a - sum / count);
+  const double drift_a = std::sqrt(squares / (count - 1));  // of the sensor between rests: it does not average out
+  found.value = {sum / count, std::max(drift_a, cell.parameters.noise.current_a)};
+  found.why = fmt::format("if no current flows during the {:.0f} minutes of rest in the log", minutes);
+  return found;
+}
+
+}  // namespace bms::workflow

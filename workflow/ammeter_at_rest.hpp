@@ -1,0 +1,15 @@
+// What a current sensor reads at rest.
+#pragma once
+
+#include "files/cell_file.hpp"
+#include "measurement/recording.hpp"
+#include "workflow/ammeter.hpp"
+
+namespace bms::workflow {
+
+/// The mean reading over stretches of two to ten minutes in which the reading is small and constant. It is the offset
+/// if no current flows then; the remark says so. No answer if the stretches differ, if they are fewer than three, or if
+/// the reading is exactly 0, which a device may write by itself.
+SensorFinding reading_at_rest(const measurement::Recording& recording, const files::CellFile& cell);
+
+}  // namespace bms::workflow

@@ -1,0 +1,15 @@
+// A recording with fewer rows and the same charge, for fits that simulate it many times.
+#pragma once
+
+#include <cstddef>
+
+#include "measurement/recording.hpp"
+
+namespace bms::workflow {
+
+/// Rows of about the same duration, at most `most` of them except at gaps: current, voltage and temperature are means
+/// over the rows that they replace, the current by time. Other columns are left out. A recording that is short enough
+/// stays as it is.
+measurement::Recording thinned(const measurement::Recording& recording, std::size_t most);
+
+}  // namespace bms::workflow
