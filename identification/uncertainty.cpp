@@ -59,8 +59,7 @@ Eigen::MatrixXd pseudo_inverse(const FreeColumns& free, Eigen::VectorXi& identif
   for (double& value : inverse) value = value > undetermined ? 1 / value : 0;
   for (Eigen::Index k = 0; k < free.size(); ++k) {
     double hidden = 0;
-    for (Eigen::Index e = 0; e < free.size(); ++e)
-      hidden += inverse[e] > 0 ? 0 : vectors(k, e) * vectors(k, e);
+    for (Eigen::Index e = 0; e < free.size(); ++e) hidden += inverse[e] > 0 ? 0 : vectors(k, e) * vectors(k, e);
     identifiable[free.of(k)] = hidden < largest_part ? 1 : 0;
   }
   return vectors * inverse.asDiagonal() * vectors.transpose();

@@ -20,8 +20,7 @@ VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
   const auto [u, values, v] = thin_svd(a);
   const VectorXd along = u.transpose() * b;
   VectorXd p = VectorXd::Zero(a.cols());
-  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k)
-    p -= v.col(k) * (along[k] / values[k]);
+  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k) p -= v.col(k) * (along[k] / values[k]);
   return p;
 }
 
