@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "benchmark/cause_ids.hpp"
 #include "diagnosis/bursts.hpp"
 #include "diagnosis/denoise_current.hpp"
 #include "diagnosis/hypothesis.hpp"
@@ -73,8 +74,6 @@ std::vector<model::Span> where(const PreparedCase& q, const Columns& column) {
     energy[k] = column(static_cast<Eigen::Index>(k), 0) * column(static_cast<Eigen::Index>(k), 0);
   return diagnosis::strongest_spans(q.recording, energy);
 }
-
-std::string id_of(std::size_t mechanism) { return std::string(catalogue[mechanism].id); }
 
 Outcome completed(const truth::Case& c, const PreparedCase& q, Outcome o, const std::vector<model::Span>& spans,
                   const std::vector<double>& holdout_v) {

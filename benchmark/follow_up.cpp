@@ -4,16 +4,13 @@
 #include <chrono>
 #include <cmath>
 
+#include "benchmark/cause_ids.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "diagnosis/reference.hpp"
 
 namespace bms::benchmark {
 
 namespace {
-
-bool contains(const std::vector<std::string>& list, const std::string& id) {
-  return std::find(list.begin(), list.end(), id) != list.end();
-}
 
 /// The profile at the sampling rate of the recording, with the readings of the reference instruments that it asks for.
 diagnosis::PreparedRecording carried_out(const truth::Case& c, const model::CellParameters<>& cell,

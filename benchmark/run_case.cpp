@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "benchmark/cause_ids.hpp"
+
 namespace bms::benchmark {
 
 namespace {
@@ -25,8 +27,6 @@ double overlap(const std::vector<model::Span>& spans, double start_s, double end
   const double all = covered + (end_s - start_s) - inside;
   return all > 0 ? inside / all : 0;
 }
-
-std::string id_of(std::size_t mechanism) { return std::string(model::catalogue[mechanism].id); }
 
 /// The figures behind the decision.
 std::string figures_of(const diagnosis::Diagnosis& d) {

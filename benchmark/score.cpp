@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "benchmark/cause_ids.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::benchmark {
@@ -20,10 +21,6 @@ constexpr double detectable = 2;
 /// Hold-out error, in noise floors, up to which a prediction counts as good; or the part of the error above the floor
 /// that may remain.
 constexpr double good_holdout_floors = 1.3, good_holdout_part = 0.1;
-
-bool contains(const std::vector<std::string>& list, const std::string& id) {
-  return std::find(list.begin(), list.end(), id) != list.end();
-}
 
 /// Returns true if the verdict names causes.
 bool named(const Outcome& o) {

@@ -8,8 +8,8 @@
 #include <stdexcept>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/QR>
 
+#include "identification/matrix_factors.hpp"
 #include "identification/prefilter.hpp"
 
 namespace bms::identification {
@@ -110,7 +110,7 @@ VectorXd solve(Eigen::MatrixXd a, const VectorXd& y) {
   VectorXd size = a.colwise().norm();
   for (double& s : size) s = s > 0 && std::isfinite(s) ? s : 1;
   a *= size.cwiseInverse().asDiagonal();
-  return size.cwiseInverse().cwiseProduct(a.colPivHouseholderQr().solve(y));
+  return size.cwiseInverse().cwiseProduct(solve_least_squares(a, y));
 }
 
 /// The output error is linear in all but F: those numbers by linear least squares, and the cost that remains.

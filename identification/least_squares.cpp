@@ -8,6 +8,7 @@
 
 #include <Eigen/QR>
 
+#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
@@ -170,10 +171,7 @@ Optimisation::Outlook Optimisation::outlook(const Indices& free) const {
   a = a * norms.cwiseInverse().asDiagonal();
   VectorXd step = VectorXd::Zero(size());
   if (!free.empty()) {
-    Eigen::ColPivHouseholderQR<MatrixXd> qr;
-    qr.setThreshold(dependent_columns);
-    qr.compute(a);
-    const VectorXd p = qr.solve(-rotated_);
+    const VectorXd p = solve_least_squares(a, -rotated_, dependent_columns);
     step(free) = p.cwiseQuotient(norms);
   }
   const double decrease = -expected_change(step);

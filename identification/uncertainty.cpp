@@ -4,8 +4,7 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Eigenvalues>
-
+#include "identification/matrix_factors.hpp"
 #include "identification/residuals.hpp"
 
 namespace bms::identification {
@@ -55,16 +54,15 @@ FreeColumns free_columns(const Eigen::MatrixXd& jacobian, const Eigen::VectorXi&
 Eigen::MatrixXd pseudo_inverse(const FreeColumns& free, Eigen::VectorXi& identifiable) {
   constexpr double undetermined = 1e-12;  // eigenvalue
   constexpr double largest_part = 0.01;   // of a parameter that lies in undetermined directions
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(Eigen::MatrixXd(free.scaled.transpose() * free.scaled));
-  Eigen::VectorXd inverse = eigen.eigenvalues();
+  const auto [values, vectors] = symmetric_eigen(free.scaled.transpose() * free.scaled);
+  Eigen::VectorXd inverse = values;
   for (double& value : inverse) value = value > undetermined ? 1 / value : 0;
   for (Eigen::Index k = 0; k < free.size(); ++k) {
     double hidden = 0;
-    for (Eigen::Index e = 0; e < free.size(); ++e)
-      hidden += inverse[e] > 0 ? 0 : eigen.eigenvectors()(k, e) * eigen.eigenvectors()(k, e);
+    for (Eigen::Index e = 0; e < free.size(); ++e) hidden += inverse[e] > 0 ? 0 : vectors(k, e) * vectors(k, e);
     identifiable[free.of(k)] = hidden < largest_part ? 1 : 0;
   }
-  return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
+  return vectors * inverse.asDiagonal() * vectors.transpose();
 }
 
 /// The middle of the coloured covariance: the long-run covariance of the scores of the samples, and the priors.

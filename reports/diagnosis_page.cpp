@@ -35,7 +35,7 @@ json rms_mv(const identification::ErrorFigure& error) {
   return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr);
 }
 
-json spans_of(const std::vector<model::Span>& spans) {
+json strip_spans(const std::vector<model::Span>& spans) {
   json list = json::array();
   for (const model::Span& s : spans) list.push_back({rounded(s.start_s, 1), rounded(s.end_s, 1)});
   return list;
@@ -86,7 +86,7 @@ json strip_of(const workflow::DiagnoseResult& r, std::size_t n, std::size_t bins
     strip["temperature_c"].push_back(temperatures > 0 ? rounded(sum_c / static_cast<double>(temperatures), 2)
                                                       : json(nullptr));
   }
-  if (n == 0) strip["spans"] = spans_of(r.diagnosis.spans);
+  if (n == 0) strip["spans"] = strip_spans(r.diagnosis.spans);
   return strip;
 }
 

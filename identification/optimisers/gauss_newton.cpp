@@ -3,8 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include <Eigen/SVD>
-
+#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
@@ -18,12 +17,10 @@ using Eigen::VectorXd;
 constexpr int most_bisections = 25;  // MaxBisections of the toolbox
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
-  const Eigen::BDCSVD<MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
-  const VectorXd& values = svd.singularValues();
-  const VectorXd along = svd.matrixU().transpose() * b;
+  const auto [u, values, v] = thin_svd(a);
+  const VectorXd along = u.transpose() * b;
   VectorXd p = VectorXd::Zero(a.cols());
-  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k)
-    p -= svd.matrixV().col(k) * (along[k] / values[k]);
+  for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k) p -= v.col(k) * (along[k] / values[k]);
   return p;
 }
 

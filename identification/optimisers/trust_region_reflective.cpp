@@ -11,8 +11,7 @@
 #include <cmath>
 #include <limits>
 
-#include <Eigen/SVD>
-
+#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
 
 namespace bms::identification {
@@ -44,10 +43,10 @@ class ScaledModel {
     MatrixXd both = MatrixXd::Zero(2 * n, n);
     both.topRows(n) = run.factor() * scaling_.asDiagonal();
     both.bottomRows(n).diagonal() = curvature_.cwiseSqrt();
-    const Eigen::BDCSVD<MatrixXd> svd(both, Eigen::ComputeThinU | Eigen::ComputeThinV);
-    values_ = svd.singularValues();
-    vectors_ = svd.matrixV();
-    along_ = svd.matrixU().topRows(n).transpose() * run.rotated();
+    const ThinSvd svd = thin_svd(both);
+    values_ = svd.values;
+    vectors_ = svd.v;
+    along_ = svd.u.topRows(n).transpose() * run.rotated();
   }
 
   const VectorXd& scaling() const { return scaling_; }

@@ -1,0 +1,26 @@
+#include "identification/matrix_factors.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <Eigen/SVD>
+
+namespace bms::identification {
+
+ThinSvd thin_svd(const Eigen::MatrixXd& a) {
+  const Eigen::BDCSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return {svd.matrixU(), svd.singularValues(), svd.matrixV()};
+}
+
+SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
+  return {eigen.eigenvalues(), eigen.eigenvectors()};
+}
+
+Eigen::VectorXd solve_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double dependent) {
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr;
+  if (dependent > 0) qr.setThreshold(dependent);
+  qr.compute(a);
+  return qr.solve(b);
+}
+
+}  // namespace bms::identification

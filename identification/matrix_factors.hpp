@@ -1,0 +1,27 @@
+// Factors of dense matrices. Each takes 5 to 25 s to compile inside Eigen, so they are compiled once, here.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace bms::identification {
+
+/// A = U diag(values) V', as many columns as A has rows or columns, whichever is less; values in descending order.
+struct ThinSvd {
+  Eigen::MatrixXd u;
+  Eigen::VectorXd values;
+  Eigen::MatrixXd v;
+};
+ThinSvd thin_svd(const Eigen::MatrixXd& a);
+
+/// A = vectors diag(values) vectors' of a symmetric A, values in ascending order.
+struct SymmetricEigen {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd vectors;
+};
+SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a);
+
+/// The x that minimises |A x - b|, by QR with column pivoting. Columns whose pivot is at most `dependent` times the
+/// largest are left out; 0: below rounding.
+Eigen::VectorXd solve_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double dependent = 0);
+
+}  // namespace bms::identification
