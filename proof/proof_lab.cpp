@@ -25,8 +25,8 @@ constexpr workflow::SocWindow identified_window{.high = 0.95, .low = 0.15};
 workflow::RecordingComparison prepared(const measurement::Recording& r, const files::CellFile& cell) {
   if (r.soc_ref.empty() || !std::isfinite(r.soc_ref.front()))
     throw files::BadInput(r.path, 1, "no soc_ref at the start, expected the reference state of charge");
-  return workflow::prepared(r, std::filesystem::path(r.path).stem().string(), cell,
-                            workflow::given_start(cell, r.soc_ref.front()));
+  const std::string file = std::filesystem::path(r.path).filename().string();
+  return workflow::prepared(r, file.substr(0, file.find('.')), cell, workflow::given_start(cell, r.soc_ref.front()));
 }
 
 /// "ocv_hysteresis: half_gap_v 18.4 +- 0.4 mV; or slow_polarisation".
@@ -44,6 +44,11 @@ std::string text_of(const diagnosis::Finding& f) {
 }
 
 }  // namespace
+
+std::string ProofLab::path(const std::string& name) const {
+  const std::string plain = folder_ + "/" + name + ".csv", compressed = plain + ".gz";
+  return std::filesystem::exists(compressed) && !std::filesystem::exists(plain) ? compressed : plain;
+}
 
 const measurement::Recording& ProofLab::recording(const std::string& name) {
   return recordings_.get(name, [&] { return files::read_recording(path(name)); });

@@ -64,7 +64,8 @@ class ProofLab {
   ProofLab(std::string folder, double work, workflow::Progress progress)
       : folder_(std::move(folder)), work_(work), progress_(std::move(progress)) {}
 
-  std::string path(const std::string& name) const { return folder_ + "/" + name + ".csv"; }
+  /// NAME.csv, or NAME.csv.gz if only that exists.
+  std::string path(const std::string& name) const;
   const measurement::Recording& recording(const std::string& name);
 
   const files::CellFile& built_in(const std::string& name);

@@ -69,6 +69,8 @@ class ProofTool : public ::testing::Test {
           "a123_26650/dyn10_P45_A002", "a123_26650/cccv1C_P25_A002", "a123_26650/fsae_P25_A004"}) {
       simulated(name, drive(name.find("udds") != std::string::npos ? 6 : 1), "0.7", 25);
     }
+    // as in the repository
+    ASSERT_EQ(std::system(("gzip " + path("data/a123_26650/udds_P25_A002.csv")).c_str()), 0);
   }
   images::TemporaryFolder folder_;
 };
@@ -127,6 +129,45 @@ TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
   // independent of which experiment made a shared diagnosis first
   ASSERT_EQ(run_tool("proof --quiet --data " + path("data") + " --json " + path("again.json")).exit_code, 0);
   EXPECT_EQ(reproducible(content(path("again.json"))), reproducible(content(path("r.json"))));
+}
+
+/// Every recording that an experiment names is part of the repository.
+TEST(ProofRecordings, AreInTheRepository) {
+  const std::filesystem::path experiments = BMS_SOURCE_DIR "/proof/experiments",
+                              recordings = BMS_SOURCE_DIR "/recordings";
+  std::set<std::string> named;
+  for (const auto& entry : std::filesystem::directory_iterator(experiments)) {
+    const std::string text = content(entry.path());
+    const std::regex name("a123_[a-z0-9]+/[A-Za-z0-9_]+");
+    for (std::sregex_iterator at(text.begin(), text.end(), name), end; at != end; ++at) named.insert(at->str());
+  }
+  EXPECT_GT(named.size(), 12U);
+  for (const std::string& name : named) EXPECT_TRUE(std::filesystem::exists(recordings / (name + ".csv.gz"))) << name;
+}
+
+/// The second page of ./bms demo: leads and contacts that the cell file does not contain, in a real recording. What a
+/// second voltmeter found stands in recordings/nasa_18650/README.md.
+TEST(RealRecording, ContactsThatTheCellFileDoesNotContainAreNamedMeasuredAndModelled) {
+  const images::TemporaryFolder folder;
+  const std::string recordings = BMS_SOURCE_DIR "/recordings/nasa_18650/B0025/",
+                    cell = (folder.path() / "cell.toml").string(), result = (folder.path() / "r.json").string();
+  ASSERT_EQ(
+      run_tool("identify --quiet --recording " + recordings + "d005.csv.gz " + recordings +
+               "d007.csv.gz --ocv-from-load --initial-soc 1 --start table9 --chemistry NCA --capacity-ah 1.85 --out " +
+               cell)
+          .exit_code,
+      0);
+  const ToolRun run =
+      run_tool("diagnose --quiet --cell " + cell + " --recording " + recordings +
+               "d003_load.csv.gz --initial-soc 1 --holdout " + recordings + "d056_load.csv.gz --json " + result);
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const json r = json::parse(content(result));
+  EXPECT_EQ(r["verdict"], "CAUSE");
+  ASSERT_EQ(r["mechanisms"].size(), 1U) << r["mechanisms"];
+  EXPECT_EQ(r["mechanisms"][0]["id"], "resistance_growth");
+  const double growth = r["mechanisms"][0]["parameters"][0]["value"];
+  EXPECT_NEAR(growth * 0.106, 0.465, 0.03) << "R0 of the cell file is 0.106 ohm";
+  EXPECT_LT(r["extended"]["holdout"]["rmse_v"].get<double>(), 0.1 * r["baseline"]["holdout"]["rmse_v"].get<double>());
 }
 
 }  // namespace
