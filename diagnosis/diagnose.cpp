@@ -9,6 +9,7 @@
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/findings.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/one_current.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
@@ -133,11 +134,17 @@ void add_numbers(const Adequacy& adequacy, const NoiseModel& nominal, Diagnosis&
 
 /// Where the mismatch lies, how much of it is explained, and the voltages for plots.
 void add_location(const LikelihoodModel& likelihood, const HypothesisFit& best, const Contributions& contributed,
-                  const Adequacy& adequacy, Diagnosis& d) {
+                  const Adequacy& adequacy, const Errors& errors, Diagnosis& d) {
   const bool unexplained = d.verdict == Verdict::unknown || !adequacy.found;
   d.explained_share = contributed.explained_share;
+  if (names(d.verdict)) {  // of the error of the cell file as it is, which is the one that is reported
+    const double white_v2 = d.noise.white_v * d.noise.white_v, file_v2 = std::pow(errors.file_v, 2);
+    if (file_v2 > white_v2)
+      d.explained_share =
+          std::clamp((file_v2 - std::pow(contributed.remaining_rmse_v, 2)) / (file_v2 - white_v2), 0.0, 1.0);
+  }
   d.unexplained_rmse_v = contributed.remaining_rmse_v;
-  d.unexplained_share = 1 - contributed.explained_share;
+  d.unexplained_share = 1 - d.explained_share;
   d.spans = unexplained ? adequacy.residual.spans : contributed.spans;
   d.regimes = regimes(likelihood, best, unexplained ? adequacy.residual.energy : contributed.energy);
   for (std::size_t r = 0; r < likelihood.records().size(); ++r) {
@@ -233,6 +240,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   if (options.healthy.known) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
     survivors = judge_healthy->without_withheld(std::move(survivors));
+    survivors = without_uncertain(search, likelihood, control, std::move(survivors));
   }
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
   d.unknown_gain = unknown_gain(adequacy.residual);
@@ -248,13 +256,15 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);
+  add_alike_at_one_current(likelihood, d.findings);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors);
-  d.verdict = verdict_of(adequacy, d, contributed, errors_of(search, likelihood, options.healthy));
+  const Errors errors = errors_of(search, likelihood, options.healthy);
+  d.verdict = verdict_of(adequacy, d, contributed, errors);
   d.interrupted = search.stopped();
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
   add_numbers(adequacy, search.nominal_noise(), d);
-  add_location(likelihood, survivors.best, contributed, adequacy, d);
+  add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
   if (!options.learns) add_law_term(likelihood, search.nominal_noise(), d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);

@@ -38,55 +38,81 @@ constexpr std::array<FamilyLaw, 3> family_laws = {{
     {"the load before", "fast", "time"},
 }};
 
-std::size_t fold_of(std::size_t row, std::size_t rows) {
-  return term_limits.blocks * row / std::max<std::size_t>(rows, 1) % term_limits.folds;
-}
+/// Which part of a recording is left out: every third of so many equal blocks.
+struct Folds {
+  std::size_t blocks;
+  std::size_t block_of(std::size_t row, std::size_t rows) const {
+    return blocks * row / std::max<std::size_t>(rows, 1);
+  }
+  std::size_t fold_of(std::size_t row, std::size_t rows) const { return block_of(row, rows) % term_limits.folds; }
+};
+constexpr Folds short_blocks{term_limits.blocks}, long_blocks{term_limits.long_blocks};
 
-std::vector<PreparedRecording> without_fold(const std::vector<PreparedRecording>& records, std::size_t fold) {
+std::vector<PreparedRecording> without_fold(const std::vector<PreparedRecording>& records, const Folds& folds,
+                                            std::size_t fold) {
   std::vector<PreparedRecording> kept = records;
   for (PreparedRecording& r : kept) {
     std::vector<double>& volts = r.voltage_v.edit();
     for (std::size_t k = 0; k < volts.size(); ++k) {
-      if (fold_of(k, volts.size()) == fold) volts[k] = std::numeric_limits<double>::quiet_NaN();
+      if (folds.fold_of(k, volts.size()) == fold) volts[k] = std::numeric_limits<double>::quiet_NaN();
     }
   }
   return kept;
 }
 
-/// Squared errors of the readings in one fold, fitted on the others.
-measurement::MeanSquare left_out_error(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loosened,
-                                       std::size_t fold) {
+/// Errors of the readings that were left out, by block.
+using BlockErrors = std::vector<measurement::MeanSquare>;
+
+/// Of the blocks of one fold, fitted on the others.
+void add_left_out(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loosened, const Folds& folds,
+                  std::size_t fold, BlockErrors& errors) {
   const Hypothesis base = all.base();
-  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), fold), nominal, loosened);
+  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), folds, fold), nominal, loosened);
   const HypothesisFit fit = kept.fit(base);
-  measurement::MeanSquare error;
   for (std::size_t r = 0; r < all.records().size(); ++r) {
     const std::vector<double> volts = kept.voltage(fit.hypothesis, fit.calibration, r);
     for (std::size_t k = 0; k < volts.size(); ++k) {
       const double e = all.records()[r].voltage_v[k] - volts[k];
-      if (fold_of(k, volts.size()) == fold && all.usable(r)[k] != 0 && std::isfinite(e)) error.add(e);
+      if (folds.fold_of(k, volts.size()) == fold && all.usable(r)[k] != 0 && std::isfinite(e))
+        errors[r * folds.blocks + folds.block_of(k, volts.size())].add(e);
     }
   }
-  return error;
 }
 
-/// RMS errors of several models on the folds left out in turn.
-std::vector<double> left_out_errors_v(const LikelihoodModel& all, const NoiseModel& nominal,
-                                      const std::vector<Loosened>& models) {
-  std::vector<measurement::MeanSquare> errors(models.size() * term_limits.folds);
-  measurement::in_parallel(errors.size(), [&](std::size_t k) {
-    errors[k] = left_out_error(all, nominal, models[k / term_limits.folds], k % term_limits.folds);
+/// Of several models; each fold writes blocks of its own.
+std::vector<BlockErrors> left_out(const LikelihoodModel& all, const NoiseModel& nominal,
+                                  const std::vector<Loosened>& models, const Folds& folds) {
+  std::vector<BlockErrors> errors(models.size(), BlockErrors(all.records().size() * folds.blocks));
+  measurement::in_parallel(models.size() * term_limits.folds, [&](std::size_t k) {
+    const std::size_t model = k / term_limits.folds;
+    add_left_out(all, nominal, models[model], folds, k % term_limits.folds, errors[model]);
   });
-  std::vector<double> rms_v;
-  for (std::size_t m = 0; m < models.size(); ++m) {
-    double sum = 0, count = 0;
-    for (std::size_t f = 0; f < term_limits.folds; ++f) {
-      sum += errors[m * term_limits.folds + f].sum();
-      count += static_cast<double>(errors[m * term_limits.folds + f].count());
-    }
-    rms_v.push_back(std::sqrt(sum / std::max(count, 1.0)));
+  return errors;
+}
+
+double rms_v(const BlockErrors& errors) {
+  double sum = 0, count = 0;
+  for (const measurement::MeanSquare& e : errors) {
+    sum += e.sum();
+    count += static_cast<double>(e.count());
   }
-  return rms_v;
+  return std::sqrt(sum / std::max(count, 1.0));
+}
+
+/// Returns true if the squared error of the blocks is smaller by more than chance: its mean change over the standard
+/// deviation of that mean.
+bool improves(const BlockErrors& before, const BlockErrors& after) {
+  double sum = 0, squares = 0, n = 0;
+  for (std::size_t b = 0; b < before.size(); ++b) {
+    if (before[b].count() == 0) continue;
+    const double change = before[b].sum() - after[b].sum();
+    sum += change;
+    squares += change * change;
+    ++n;
+  }
+  if (n < 2) return false;
+  const double mean = sum / n, variance = (squares / n - mean * mean) / (n - 1);
+  return mean > term_limits.improves_sigmas * std::sqrt(std::max(variance, 0.0));
 }
 
 Loosened loosened(const TableLaw& law, double times) {
@@ -122,29 +148,40 @@ std::string_view name_of_law(const LawTerm& term) {
 
 std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
                                       std::string_view family) {
+  const auto errors_of = [&](const std::vector<Loosened>& models, const Folds& folds) {
+    return left_out(likelihood, nominal, models, folds);
+  };
   std::vector<Loosened> models = {Loosened{}};
   for (const TableLaw& law : table_laws) models.push_back(loosened(law, term_limits.times_tolerance.front()));
-  const std::vector<double> errors_v = left_out_errors_v(likelihood, nominal, models);
-  const auto least = std::min_element(errors_v.begin() + 1, errors_v.end());
-  if (!(*least < term_limits.error_left * errors_v.front())) return by_family(family, errors_v.front());
+  const std::vector<BlockErrors> errors = errors_of(models, short_blocks);
+  const auto least = std::min_element(errors.begin() + 1, errors.end(),
+                                      [](const BlockErrors& a, const BlockErrors& b) { return rms_v(a) < rms_v(b); });
+  const double before_v = rms_v(errors.front());
+  if (!(rms_v(*least) < term_limits.error_left * before_v)) return by_family(family, before_v);
 
-  const TableLaw& law = table_laws[static_cast<std::size_t>(least - errors_v.begin()) - 1];
-  LawTerm term{law.id, {}, errors_v.front(), *least, term_limits.times_tolerance.front(), std::nullopt};
+  const TableLaw& law = table_laws[static_cast<std::size_t>(least - errors.begin()) - 1];
+  LawTerm term{law.id, {}, before_v, rms_v(*least), term_limits.times_tolerance.front(), std::nullopt};
   for (const char* on : law.depends_on) {
     if (on != nullptr) term.depends_on.emplace_back(on);
   }
   std::vector<Loosened> others;
   for (std::size_t k = 1; k < term_limits.times_tolerance.size(); ++k)
     others.push_back(loosened(law, term_limits.times_tolerance[k]));
-  const std::vector<double> with_v = left_out_errors_v(likelihood, nominal, others);
-  for (std::size_t k = 0; k < others.size(); ++k) {
-    if (!(with_v[k] < term.left_out_after_v)) continue;
-    term.left_out_after_v = with_v[k];
-    term.times_tolerance = term_limits.times_tolerance[k + 1];
-  }
+  std::vector<BlockErrors> with = errors_of(others, short_blocks);
+  with.insert(with.begin(), *least);
+  double least_v = term.left_out_after_v;
+  for (const BlockErrors& e : with) least_v = std::min(least_v, rms_v(e));
+  std::size_t chosen = with.size() - 1;  // the smallest factor that is as good as the best
+  while (rms_v(with[chosen]) > term_limits.as_good * least_v) --chosen;
+  term.left_out_after_v = rms_v(with[chosen]);
+  term.times_tolerance = term_limits.times_tolerance[chosen];
+  if (!improves(errors.front(), with[chosen])) return term;
+  const Loosened free = loosened(law, term.times_tolerance);
+  const std::vector<BlockErrors> far = errors_of({Loosened{}, free}, long_blocks);
+  if (!(rms_v(far[1]) <= rms_v(far[0]))) return term;
   // a cell file does not accept every table, for example an OCV that falls
-  const model::CellParameters<> with = cell_with_term(likelihood, nominal, loosened(law, term.times_tolerance));
-  if (model::first_fault(with).what == nullptr) term.cell = with;
+  const model::CellParameters<> cell = cell_with_term(likelihood, nominal, free);
+  if (model::first_fault(cell).what == nullptr) term.cell = cell;
   return term;
 }
 

@@ -95,7 +95,8 @@ struct DefaultKnowledge {
   static constexpr Fact facts = Fact::none;    ///< that help to distinguish it
   static constexpr std::size_t same_recording_as = no_mechanism;  ///< its recordings cannot be distinguished from those
                                                                   ///< of this one, whatever the current
-  static constexpr double searched_unknowns = 0;                  ///< searched in addition to the parameters
+  static constexpr bool needs_first_strength = false;  ///< its other strengths mean nothing without the first
+  static constexpr double searched_unknowns = 0;       ///< searched in addition to the parameters
 
   /// What a finding says, with its number, as the beginning of a sentence.
   static std::string claim(const MechanismSetting& s) {
@@ -161,6 +162,7 @@ struct MechanismKnowledge {
   bool probes_places, follows_temperature, outside_cell, report_limit;
   Fact facts;
   std::size_t same_recording_as;
+  bool needs_first_strength;
   double searched_unknowns;
   std::string (*claim)(const MechanismSetting&);
   std::vector<double> (*probing_shapes)(double);

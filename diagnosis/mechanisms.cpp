@@ -23,6 +23,7 @@ constexpr MechanismKnowledge knowledge() {
           .report_limit = K::report_limit,
           .facts = K::facts,
           .same_recording_as = K::same_recording_as,
+          .needs_first_strength = K::needs_first_strength,
           .searched_unknowns = K::searched_unknowns,
           .claim = K::claim,
           .probing_shapes = K::probing_shapes,

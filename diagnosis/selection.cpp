@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/block_covariance.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
@@ -15,8 +16,9 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
-/// Returns true if a mechanism's own strength does not carry it: each of its strengths is at a bound or within two of
-/// its standard deviations of none. One without a standard deviation was searched, and counts.
+/// Returns true if a mechanism's own strength does not carry it: each of its strengths, or the first one if the others
+/// mean nothing without it, is at a bound or within two of its standard deviations of none. One without a standard
+/// deviation was searched, and counts.
 bool is_weak(const HypothesisFit& f, std::size_t mechanism) {
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
   bool has_strength = false;
@@ -24,6 +26,7 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism) {
     const MechanismSetting& s = f.hypothesis.settings[sought[j].setting];
     const model::Parameter& p = model::catalogue[s.index].parameter[sought[j].parameter];
     if (s.index != mechanism || p.role != model::Role::strength) continue;
+    if (sought[j].parameter > 0 && knowledge_of(mechanism).needs_first_strength) continue;
     has_strength = true;
     const double value = s.value[sought[j].parameter], sigma = s.deviation[sought[j].parameter];
     const bool known = std::isfinite(sigma) && sigma > 0;
@@ -226,6 +229,29 @@ Survivors eliminate(Search& search, const LikelihoodModel& likelihood, const Hyp
   for (int round = 0; round < numerics.search.elimination_rounds && elimination.round(); ++round) {
   }
   return std::move(elimination).survivors();
+}
+
+Survivors without_one(Search& search, const HypothesisFit& control, const Survivors& found, std::size_t mechanism) {
+  const auto reduced = [&](const HypothesisFit& f, std::size_t m) {
+    return f.hypothesis.added().size() == 1 ? control : search.without_one(f, m);
+  };
+  Survivors rest{reduced(found.best, mechanism), {}, {}, {}};
+  for (const std::size_t m : rest.best.hypothesis.added())
+    rest.gains[m] = search.gain(reduced(rest.best, m), rest.best);
+  return rest;
+}
+
+Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const HypothesisFit& control,
+                            Survivors found) {
+  for (;;) {
+    likelihood.set_noise(found.best.noise);
+    HypothesisFit with_error = found.best;
+    include_model_error(likelihood, with_error);
+    const std::vector<std::size_t> added = with_error.hypothesis.added();
+    const auto weak = std::find_if(added.begin(), added.end(), [&](std::size_t m) { return is_weak(with_error, m); });
+    if (weak == added.end()) return found;
+    found = without_one(search, control, found, *weak);
+  }
 }
 
 }  // namespace bms::diagnosis

@@ -44,4 +44,11 @@ struct Survivors {
 Survivors eliminate(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                     const HypothesisFit& grown, const Scope& scope);
 
+/// The rest fitted again without a mechanism, with its gains.
+Survivors without_one(Search& search, const HypothesisFit& control, const Survivors& found, std::size_t mechanism);
+
+/// Removes mechanisms whose strength the error of the model does not let stand: within two standard deviations of none
+/// where these contain it.
+Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const HypothesisFit& control, Survivors found);
+
 }  // namespace bms::diagnosis

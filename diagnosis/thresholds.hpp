@@ -152,6 +152,9 @@ struct Thresholds {
     double rail_c = 0.2;       ///< [C] the largest current at least, to see a sensor's end
     double rail_share = 0.9;   ///< of the largest current that is near the end
     std::size_t rail_rows = 4, rail_runs = 2;  ///< rows near it and separate visits needed
+    double one_current_within = 0.1;           ///< from their median within which currents are one size
+    double one_current_share = 0.98;           ///< of the loaded rows with it: the rest are the load's ends
+    std::size_t one_current_edges = 6;         ///< steps of the current at most: more show the resistance by themselves
   };
 
   /// NOT_TESTABLE: below these nothing can be said of any mechanism.
@@ -320,7 +323,11 @@ struct Thresholds {
   struct LawTerms {
     std::size_t folds = 3, blocks = 24;                  ///< of each recording: every third block is left out in turn
     std::array<double, 3> times_tolerance = {20, 8, 3};  ///< of the law's tables; laws are compared at the first
-    double error_left = 0.8;  ///< share of the error on what was left out, below which a law is named by its term
+    double error_left = 0.8;       ///< share of the error on what was left out, below which a law is named by its term
+    double improves_sigmas = 1.5;  ///< mean improvement of the blocks left out over its standard deviation, at least
+    std::size_t long_blocks = 6;   ///< a term must do no harm either where so long parts are left out: next to short
+                                   ///< ones a drift of this recording looks like a law
+    double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
   };
 
   RecordingFaults recording;

@@ -99,16 +99,6 @@ std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
   return least;
 }
 
-Survivors HealthyJudge::without(const Survivors& found, std::size_t mechanism) const {
-  const auto reduced = [&](const HypothesisFit& f, std::size_t m) {
-    return f.hypothesis.added().size() == 1 ? control_ : search_.without_one(f, m);
-  };
-  Survivors rest{reduced(found.best, mechanism), {}, {}, {}};
-  for (const std::size_t m : rest.best.hypothesis.added())
-    rest.gains[m] = search_.gain(reduced(rest.best, m), rest.best);
-  return rest;
-}
-
 Survivors HealthyJudge::without_withheld(Survivors found) {
   if (!is_covered()) {
     for (const std::size_t m : found.best.hypothesis.added())
@@ -120,7 +110,7 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     while (std::optional<Withheld> least = least_of(found)) {
       std::erase(scope_.searched, least->mechanism);
       scope_.expected.erase(least->mechanism);
-      found = without(found, least->mechanism);
+      found = without_one(search_, control_, found, least->mechanism);
       withheld_.push_back(*std::move(least));
       removed = true;
     }

@@ -42,8 +42,6 @@ class HealthyJudge {
   HealthyComparison compare(std::size_t mechanism, double gain) const;
   /// The mechanism that stands out least; nothing if all stand out.
   std::optional<Withheld> least_of(const Survivors& found) const;
-  /// The rest fitted again, with its gains.
-  Survivors without(const Survivors& found, std::size_t mechanism) const;
 
   Search& search_;
   const LikelihoodModel& likelihood_;

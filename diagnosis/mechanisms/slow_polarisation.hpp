@@ -21,6 +21,7 @@ struct Knowledge<model::SlowPolarisation> : DefaultKnowledge<model::SlowPolarisa
       .action = "Use the extended cell file: its second, slow element follows the relaxation."};
   static constexpr bool report_limit = true;
   static constexpr Fact facts = Fact::rests;
+  static constexpr bool needs_first_strength = true;
   static constexpr std::size_t time_constant = 1, faster_share = 2;  ///< places of the parameters
   static constexpr double times_rc = 2;           ///< time constant over R1 C1, at least: what is as fast is R1 C1,
   static constexpr double floor_at_most_s = 600;  ///< [s] but the bound is not raised beyond this

@@ -49,6 +49,12 @@ TEST(LawTerm, AResistanceOfAnotherShapeIsNamedAndModelled) {
   });
 }
 
+TEST(LawTerm, ADriftOfTheInstrumentIsNotLearnedAsALaw) {
+  const auto term =
+      learned([](std::size_t row, double, double) { return 0.008 * std::sin(static_cast<double>(row) / 700); });
+  EXPECT_FALSE(term && term->cell) << term->law << " " << term->left_out_before_v << " " << term->left_out_after_v;
+}
+
 TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }
 
 }  // namespace

@@ -1,0 +1,68 @@
+#include "diagnosis/one_current.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "diagnosis/thresholds.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+constexpr const Thresholds::Facts& current_limits = thresholds.facts;
+
+template <class... M>
+constexpr std::array<std::size_t, sizeof...(M)> indices = {model::mechanism_index_of<M>...};
+
+/// Each changes the charge that is counted, the drop of the voltage, or both.
+constexpr auto alike_at_one_current =
+    indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange,
+            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation>;
+
+bool contains(const std::vector<std::size_t>& list, std::size_t m) {
+  return std::find(list.begin(), list.end(), m) != list.end();
+}
+
+}  // namespace
+
+bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
+  std::vector<double> loaded_a;
+  std::size_t edges = 0;
+  for (const PreparedRecording& r : records) {
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      const double a = r.current_a[k];
+      if (std::abs(a) > current_limits.moving_c * capacity_ah) loaded_a.push_back(a);
+      if (k > 0 && std::abs(a - r.current_a[k - 1]) > current_limits.edge_c * capacity_ah) ++edges;
+    }
+  }
+  if (loaded_a.empty() || edges > current_limits.one_current_edges) return false;
+  const double usual_a = measurement::upper_median(loaded_a);
+  const auto near = std::count_if(loaded_a.begin(), loaded_a.end(), [&](double a) {
+    return std::abs(a - usual_a) <= current_limits.one_current_within * std::abs(usual_a);
+  });
+  return static_cast<double>(near) >= current_limits.one_current_share * static_cast<double>(loaded_a.size());
+}
+
+void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Finding>& findings) {
+  if (!has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) return;
+  const Hypothesis base = likelihood.base();
+  std::vector<std::size_t> found;
+  for (const Finding& f : findings) found.push_back(f.setting.index);
+  for (Finding& f : findings) {
+    if (std::find(alike_at_one_current.begin(), alike_at_one_current.end(), f.setting.index) ==
+        alike_at_one_current.end())
+      continue;
+    std::size_t added = 0;
+    for (const std::size_t m : alike_at_one_current) {
+      if (contains(found, m) || contains(f.equivalent_to, m) || base.find(m) != nullptr) continue;
+      f.equivalent_to.push_back(m);
+      ++added;
+    }
+    // none is more probable than another
+    f.probability /= static_cast<double>(1 + added);
+  }
+}
+
+}  // namespace bms::diagnosis

@@ -1,0 +1,21 @@
+// Causes that a recording with a load of one current cannot distinguish.
+//
+// At a single current I the voltage is OCV(z0 - I t / C) - I R(t). An error of the current's reading, whatever its law,
+// is a constant there: it acts as another capacity together with another resistance, and each of these follows the
+// other within the tolerance of the cell file. Which of them fits best depends on errors of the model alone.
+#pragma once
+
+#include <vector>
+
+#include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/verdict.hpp"
+
+namespace bms::diagnosis {
+
+/// Returns true if nearly all load has one current in one direction, switched on or off only a few times.
+bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);
+
+/// Adds to a finding those causes that equal it if the recordings have one current. They have no fit of their own.
+void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Finding>& findings);
+
+}  // namespace bms::diagnosis
