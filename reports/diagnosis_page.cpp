@@ -12,6 +12,7 @@
 #include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
 #include "reports/embedded_files.hpp"
+#include "reports/law_chart.hpp"
 #include "reports/report_page.hpp"
 
 namespace bms::reports {
@@ -388,8 +389,9 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                                  {"command", diagnosis::command(*r.next)}}
                           : json(nullptr);
   report["charts"] = charts(r);
+  report["law"] = law_chart(r);
   const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +
-                             std::string(embedded::diagnosis_js);
+                             std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_js);
   return page(embedded::diagnosis_html, script, "bms diagnose",
               in_script(report.dump(-1, ' ', false, json::error_handler_t::replace)));
 }

@@ -329,6 +329,7 @@
     draw_before_after();
     draw_reasons();
     draw_unexplained();
+    learned_law(get('figure-law'), get('law'));
     draw_regimes();
     draw_limits();
   };
