@@ -2,8 +2,8 @@
 """Predicts drives at a temperature from recordings at other temperatures.
 
 For each temperature of two sets of recordings a cell file is identified without any recording of that temperature
-(bms identify --extend), then the drive of that temperature is simulated open loop and replayed. Prints the table of
-docs/figures/soc_trials.md.
+(bms identify --extend), then the drive of that temperature is simulated open loop and replayed. Prints the table
+'Temperatures left out' of docs/figures/soc_trials.md.
 
   left_out_temperatures.py TOOL DATA FOLDER [SET:TEMPERATURE ...]
 
@@ -15,7 +15,7 @@ import pathlib
 import subprocess
 import sys
 
-# drives and other recordings by temperature in degrees C; 999: any temperature's rest of the identification
+# drives and other recordings by temperature in degrees C
 SETS = {
     "a123_26650": {
         "ocv": (-15, -5, 5, 15, 25, 35, 45),

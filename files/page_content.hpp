@@ -12,6 +12,7 @@ struct PageCell {
   std::string text;  ///< as shown; a number with its digits
   std::optional<double> value, paper;
 };
+inline PageCell text_cell(const std::string& text) { return {text, {}, {}}; }
 
 struct PageTable {
   std::string id;  ///< "table4"

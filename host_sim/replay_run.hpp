@@ -107,7 +107,7 @@ Track run_estimator(const Cell& cell, const measurement::SampleList& samples,
     }
   };
   double best_s = run_once<Estimator>(cell, samples, start, keep), total_s = best_s;
-  while (timing == Timing::measured && total_s < timing_s) {
+  while (timing == Timing::measured && samples.size() > 0 && total_s < timing_s) {
     const double seconds = run_once<Estimator>(cell, samples, start, [](const auto&, std::size_t) {});
     best_s = std::min(best_s, seconds);
     total_s += seconds;

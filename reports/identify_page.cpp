@@ -11,8 +11,6 @@ namespace id = identification;
 
 namespace {
 
-files::PageCell text_cell(const std::string& text) { return {text, {}, {}}; }
-
 std::string file_name(const std::string& path) { return path.substr(path.rfind('/') + 1); }
 
 const char* remark(const id::Parameter& p) {
@@ -30,10 +28,11 @@ files::PageTable parameter_table(const id::Identification& found) {
   std::vector<id::Parameter> all = found.parameters;
   all.insert(all.end(), found.polynomials.begin(), found.polynomials.end());
   for (const id::Parameter& p : all) {
-    table.rows.push_back({text_cell(p.name), text_cell(fmt::format("{:.0f} %", 100 * p.soc)),
-                          text_cell(fmt::format("{:.5g}", p.value)), text_cell(fmt::format("{:.2g}", p.std)),
-                          text_cell(fmt::format("{:.2g}", p.std_white)),
-                          text_cell(fmt::format("{:.2g}", p.by_ocv_tolerance)), text_cell(remark(p))});
+    table.rows.push_back({files::text_cell(p.name), files::text_cell(fmt::format("{:.0f} %", 100 * p.soc)),
+                          files::text_cell(fmt::format("{:.5g}", p.value)),
+                          files::text_cell(fmt::format("{:.2g}", p.std)),
+                          files::text_cell(fmt::format("{:.2g}", p.std_white)),
+                          files::text_cell(fmt::format("{:.2g}", p.by_ocv_tolerance)), files::text_cell(remark(p))});
   }
   return table;
 }
@@ -43,14 +42,14 @@ std::vector<files::PageCell> fit_row(const std::string& name, const id::FitStati
   for (const id::FitStatistics::PredictionError& a : f.ahead)
     ahead += fmt::format("{}{:.2f}", ahead.empty() ? "" : ", ", 1e3 * a.rmse_v);
   const id::ResidualAnalysis& r = f.residuals;
-  return {text_cell(name),
-          text_cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)),
-          text_cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)),
-          text_cell(fmt::format("{:.1f} %", f.fit_percent)),
-          text_cell(ahead + " mV"),
-          text_cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * r.mean_v, 1e3 * r.mean_band_v)),
-          text_cell(fmt::format("{:.0f} % autocorrelation, {:.0f} % correlation with the current",
-                                100 * r.autocorrelated, 100 * r.input_correlated))};
+  return {files::text_cell(name),
+          files::text_cell(fmt::format("{:.2f} mV", 1e3 * f.rmse_v)),
+          files::text_cell(fmt::format("{:.2f} mV", 1e3 * f.largest_v)),
+          files::text_cell(fmt::format("{:.1f} %", f.fit_percent)),
+          files::text_cell(ahead + " mV"),
+          files::text_cell(fmt::format("{:.2f}, {:.2f} mV", 1e3 * r.mean_v, 1e3 * r.mean_band_v)),
+          files::text_cell(fmt::format("{:.0f} % autocorrelation, {:.0f} % correlation with the current",
+                                       100 * r.autocorrelated, 100 * r.input_correlated))};
 }
 
 files::PageTable fit_table(const workflow::IdentifyResult& r) {

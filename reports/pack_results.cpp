@@ -76,8 +76,6 @@ Json channels_of(const dp::Channels& channels) {
   return list;
 }
 
-files::PageCell text_cell(const std::string& text) { return {text, {}, {}}; }
-
 files::PageTable finding_table(const dp::PackDiagnosis& d) {
   files::PageTable table{
       "findings", "Findings", {"where", "what", "size", "probability", "what else", "since", "what to do"}, {}, ""};
@@ -85,10 +83,12 @@ files::PageTable finding_table(const dp::PackDiagnosis& d) {
     const dp::CauseText& text = dp::text_of(f.cause);
     const bool shared = f.cause == dp::Cause::shared;
     table.rows.push_back(
-        {text_cell(shared ? "all cells" : dp::place_of(f)), text_cell(shared ? dp::id_of(f) : std::string(text.name)),
-         text_cell(shared ? "" : dp::size_text(f)), text_cell(fmt::format("{:.0f} %", std::floor(100 * f.probability))),
-         text_cell(dp::rivals_text(f)), text_cell(dp::time_text(f)),
-         text_cell(shared ? f.because : fmt::format("{} {} {}", f.because, text.meaning, text.action))});
+        {files::text_cell(shared ? "all cells" : dp::place_of(f)),
+         files::text_cell(shared ? dp::id_of(f) : std::string(text.name)),
+         files::text_cell(shared ? "" : dp::size_text(f)),
+         files::text_cell(fmt::format("{:.0f} %", std::floor(100 * f.probability))),
+         files::text_cell(dp::rivals_text(f)), files::text_cell(dp::time_text(f)),
+         files::text_cell(shared ? f.because : fmt::format("{} {} {}", f.because, text.meaning, text.action))});
   }
   return table;
 }
@@ -98,10 +98,10 @@ files::PageTable isolability_table(const dp::PackDiagnosis& d) {
   files::PageTable table{"isolability", "What this recording can distinguish, for a typical cell", {"present"}, {}, ""};
   for (const dp::Cause c : i.causes) table.head.push_back(std::string(dp::text_of(c).id));
   for (std::size_t a = 0; a < i.causes.size(); ++a) {
-    std::vector<files::PageCell> row = {text_cell(std::string(dp::text_of(i.causes[a]).id))};
+    std::vector<files::PageCell> row = {files::text_cell(std::string(dp::text_of(i.causes[a]).id))};
     for (std::size_t b = 0; b < i.causes.size(); ++b) {
       const char* const text = i.separable[a][b] ? "yes" : "no";
-      row.push_back(text_cell(a == b ? fmt::format("found: {}", text) : text));
+      row.push_back(files::text_cell(a == b ? fmt::format("found: {}", text) : text));
     }
     table.rows.push_back(std::move(row));
   }
@@ -113,7 +113,8 @@ files::PageTable limit_table(const dp::PackDiagnosis& d) {
   files::PageTable table{"limits", "Smallest size that would be named in a typical cell", {"cause", "size"}, {}, ""};
   for (const dp::PackLimit& l : d.detection_limits) {
     const std::string text = dp::limit_text(l);
-    table.rows.push_back({text_cell(text.substr(0, text.find(' '))), text_cell(text.substr(text.find(' ') + 1))});
+    table.rows.push_back(
+        {files::text_cell(text.substr(0, text.find(' '))), files::text_cell(text.substr(text.find(' ') + 1))});
   }
   return table;
 }
@@ -203,8 +204,11 @@ std::string pack_report(const workflow::PackResult& r) {
       fmt::format("Pack: {}", diagnosis::name_of(r.diagnosis.verdict)), r.diagnosis.statement, {}, {}, {}};
   for (const measurement::Warning& w : r.warnings) page.warnings.push_back(w.text);
   if (!r.diagnosis.findings.empty()) page.tables.push_back(finding_table(r.diagnosis));
-  page.tables.push_back(
-      {"shared", "What all cells share", {"the mean of the cells against the cell file"}, {{text_cell(r.shared)}}, ""});
+  page.tables.push_back({"shared",
+                         "What all cells share",
+                         {"the mean of the cells against the cell file"},
+                         {{files::text_cell(r.shared)}},
+                         ""});
   page.tables.push_back(isolability_table(r.diagnosis));
   page.tables.push_back(limit_table(r.diagnosis));
   page.charts = {difference_chart(r), current_chart(r)};

@@ -238,14 +238,13 @@ std::string json_of(const AgainstOptions& options, const hil::SessionPlan& plan,
          "\n";
 }
 
-files::PageCell cell(const std::string& text) { return {text, {}, {}}; }
-
 std::vector<files::PageTable> tables_of(const hil::FirmwareComparison& c) {
   std::vector<files::PageTable> tables;
   if (!c.faults.empty()) {
     files::PageTable faults{"faults", "Faults that differ", {"fault", "present firmware", "new firmware"}, {}, ""};
     for (const hil::FaultDifference& d : c.faults)
-      faults.rows.push_back({cell(d.name), cell(interval(d.before)), cell(interval(d.after))});
+      faults.rows.push_back(
+          {files::text_cell(d.name), files::text_cell(interval(d.before)), files::text_cell(interval(d.after))});
     tables.push_back(std::move(faults));
   }
   if (!c.signals.empty()) {
@@ -256,9 +255,10 @@ std::vector<files::PageTable> tables_of(const hil::FirmwareComparison& c) {
         {},
         "Values at the first difference. Not compared: the version, the free stack and the time that a sample takes."};
     for (const hil::SignalDifference& d : c.signals) {
-      signals.rows.push_back({cell(d.message + "." + d.signal), cell(clock(d.first_s)), cell(d.before_text),
-                              cell(d.after_text), cell(fmt::format("{:.5g} {}", d.largest, d.unit)),
-                              cell(clock(d.largest_s)), cell(fmt::format("{}", d.samples))});
+      signals.rows.push_back({files::text_cell(d.message + "." + d.signal), files::text_cell(clock(d.first_s)),
+                              files::text_cell(d.before_text), files::text_cell(d.after_text),
+                              files::text_cell(fmt::format("{:.5g} {}", d.largest, d.unit)),
+                              files::text_cell(clock(d.largest_s)), files::text_cell(fmt::format("{}", d.samples))});
     }
     tables.push_back(std::move(signals));
   }

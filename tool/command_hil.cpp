@@ -79,13 +79,12 @@ std::string json_of(const HilOptions& options, const hil::SessionPlan& plan, con
          "\n";
 }
 
-files::PageCell cell(const std::string& text) { return {text, {}, {}}; }
-
 files::PageTable fault_table(const hil::SessionResult& r) {
   files::PageTable table{"faults", "Faults that the board reported", {"fault", "from, s", "to, s"}, {}, ""};
   for (const hil::FaultEvent& f : r.faults) {
-    table.rows.push_back({cell(f.name), cell(fmt::format("{:.1f}", f.raised_at_s)),
-                          cell(f.cleared_at_s ? fmt::format("{:.1f}", *f.cleared_at_s) : "active at the end")});
+    table.rows.push_back(
+        {files::text_cell(f.name), files::text_cell(fmt::format("{:.1f}", f.raised_at_s)),
+         files::text_cell(f.cleared_at_s ? fmt::format("{:.1f}", *f.cleared_at_s) : "active at the end")});
   }
   return table;
 }
@@ -101,9 +100,10 @@ files::PageTable reaction_table(const hil::SessionResult& r) {
       "reactions", "Injected faults", {"injected", "expected fault", "within, s", "reported after, s"}, {}, ""};
   for (const hil::InjectionResult& x : r.injection_results) {
     const std::string& expected = x.injection.expected;
-    table.rows.push_back({cell(x.injection.text), cell(expected.empty() ? "no fault" : expected),
-                          cell(expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s)),
-                          cell(reaction_time(x))});
+    table.rows.push_back({files::text_cell(x.injection.text),
+                          files::text_cell(expected.empty() ? "no fault" : expected),
+                          files::text_cell(expected.empty() ? "" : fmt::format("{:.1f}", x.injection.within_s)),
+                          files::text_cell(reaction_time(x))});
   }
   return table;
 }
