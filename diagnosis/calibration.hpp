@@ -150,8 +150,6 @@ class Calibration {
     f(Lever::capacity, capacity_, thresholds.calibration.capacity_sigma);
     f(Lever::gain, gain_, thresholds.calibration.gain_sigma);
   }
-  /// R0's share in R0 + R1 is free.
-  bool has_share() const { return share_.size() > 0; }
   std::size_t ocv_unknowns() const { return ocv_.size() + corners_.size(); }
   std::size_t initial_soc_unknown(std::size_t record) const { return initial_soc_[record]; }
 

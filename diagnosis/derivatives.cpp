@@ -17,43 +17,6 @@ namespace {
 /// Derivatives that go through the simulation at once.
 enum : std::size_t { few_lanes = 4, many_lanes = 8 };
 
-/// The base parameters' changes of the tables depend on the soc alone: they are computed with one derivative, by the
-/// soc, and one per lever of the tables if `Levers`, and then multiplied into all derivatives of the simulation.
-template <bool Levers, class S>
-void adjust_along_soc(const Calibration& calibration, const std::vector<double>& u, model::TablePoint<S>& at,
-                      const S& soc) {
-  constexpr int by_soc = 0, by_lever = 1, table_levers = Levers ? Lever::share + 1 : 0;
-  using Narrow = ceres::Jet<double, by_lever + table_levers>;
-  model::TablePoint<Narrow> change{};
-  change.r0_ohm = change.r1_ohm = change.c1_f = Narrow(1);
-  calibration.adjust(change, Narrow(soc.a, by_soc), u, [](std::size_t lever, Narrow x) {
-    if constexpr (Levers) x.v[by_lever + static_cast<Eigen::Index>(lever)] += 1;
-    return x;
-  });
-  at.ocv_v.a += change.ocv_v.a;
-  at.ocv_v.v += change.ocv_v.v[by_soc] * soc.v;
-  if constexpr (Levers) at.ocv_v.v[Lever::ocv] += change.ocv_v.v[by_lever + Lever::ocv];
-  const auto multiply = [&](S& value, const Narrow& factor, Eigen::Index lever) {
-    value.v = factor.a * value.v + (value.a * factor.v[by_soc]) * soc.v;
-    if constexpr (Levers) value.v[lever] += value.a * factor.v[by_lever + lever];
-    value.a *= factor.a;
-  };
-  multiply(at.r0_ohm, change.r0_ohm, Lever::r0);
-  multiply(at.r1_ohm, change.r1_ohm, Lever::r1);
-  multiply(at.c1_f, change.c1_f, Lever::c1);
-}
-
-/// The base parameters for derivatives by a hypothesis' parameters.
-template <class S>
-struct AlongSoc : AtUnknowns<S> {
-  void adjust(model::TablePoint<S>& at, const S& soc) const {
-    if (this->calibration.has_share())
-      AtUnknowns<S>::adjust(at, soc);
-    else
-      adjust_along_soc<false>(this->calibration, this->u, at, soc);
-  }
-};
-
 /// The base parameters for derivatives along one row: a lane per lever, then one per state as it was before the row.
 template <class S>
 struct OnLevers : AtUnknowns<S> {
@@ -63,10 +26,7 @@ struct OnLevers : AtUnknowns<S> {
   S gain_error() const { return pulled(Plain::gain_error(), Lever::gain); }
   S offset_a(std::size_t record, double time_s) const { return pulled(Plain::offset_a(record, time_s), Lever::zero); }
   void adjust(model::TablePoint<S>& at, const S& soc) const {
-    if (this->calibration.has_share())
-      this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
-    else
-      adjust_along_soc<true>(this->calibration, this->u, at, soc);
+    this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
   }
   void before_row(model::OpenLoopSimulation<S>& simulation) const {
     Eigen::Index lane = Lever::count;
@@ -174,7 +134,7 @@ void LikelihoodModel::derive(const Hypothesis& h, const Eigen::VectorXd& u, std:
   };
   for (std::size_t r = 0; r < records_.size(); ++r) {
     run<Jet>(
-        values, h, AlongSoc<Jet>{{calibration_, unknowns}}, r,
+        values, h, AtUnknowns<Jet>{calibration_, unknowns}, r,
         [&](std::size_t, const Jet& v, const auto&) { put(row++, v); },
         [&](std::size_t, const Jet& expected) { put(check_row++, expected); });
   }

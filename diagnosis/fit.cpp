@@ -7,9 +7,16 @@
 
 #include <Eigen/Cholesky>
 
-#include "diagnosis/gauss_newton.hpp"
+#include "diagnosis/fit_parameters.hpp"
+#include "diagnosis/likelihood_model.hpp"
 
 namespace bms::diagnosis {
+
+/// J_u and the factors of J_u' J_u + I.
+struct LikelihoodModel::Linearisation {
+  Columns columns;  ///< J_u, white
+  Eigen::LLT<Eigen::MatrixXd> normal;
+};
 
 namespace {
 
@@ -66,14 +73,52 @@ Eigen::VectorXd bounded_step(const Eigen::MatrixXd& normal, const Eigen::VectorX
 
 }  // namespace
 
-GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& start, const Eigen::VectorXd& calibration,
-                         int iterations)
+/// One fit in progress.
+class GaussNewton {
+ public:
+  using Linearisation = LikelihoodModel::Linearisation;
+
+  GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& start, const Eigen::VectorXd& calibration);
+  HypothesisFit run(int iterations, double hopeless);
+
+ private:
+  /// The normal equations at the current point.
+  struct NormalEquations {
+    Eigen::VectorXd u_gradient, u_alone;  ///< of the base parameters, and their step if theta stays
+    Eigen::VectorXd rhs;                  ///< of theta, u eliminated
+    Eigen::MatrixXd solved;               ///< (J_u' J_u + I)^-1 J_u' J_theta: how u follows theta
+    double within_reach = 0;              ///< gain of the full step if all were linear and unbounded
+  };
+  struct Attempt {
+    bool better = false, astray = false;
+  };
+
+  double cost_of(Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& residual) const {
+    return residual.squaredNorm() + u.squaredNorm() + parameters_.prior(h);
+  }
+  NormalEquations normal_equations();
+  Attempt attempt_step(const NormalEquations& equations);
+  bool linearise_again(const Attempt& attempt, int iteration, int& iterations);
+  void finish();
+
+  const LikelihoodModel& likelihood_;
+  FitParameters parameters_;
+  Eigen::Index m_;  ///< number of parameters
+  HypothesisFit fit_;
+  double cost_at_start_ = 0;
+  std::shared_ptr<const Linearisation> around_;
+  Eigen::MatrixXd schur_;    ///< of theta, u eliminated
+  Eigen::VectorXd natural_;  ///< d parameter / d step
+  double damping_ = fit_numerics.damping;
+  int quiet_ = 0, renewals_ = 0;
+};
+
+GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& start, const Eigen::VectorXd& calibration)
     : likelihood_(likelihood),
       parameters_(likelihood.cell_, start),
       m_(parameters_.size()),
       fit_{start, calibration, {}, 0, likelihood.noise_, {}, std::vector<char>(static_cast<std::size_t>(m_), 0), false},
-      natural_(Eigen::VectorXd::Ones(m_)),
-      iterations_(iterations) {
+      natural_(Eigen::VectorXd::Ones(m_)) {
   for (Eigen::Index j = 0; j < m_; ++j) {
     double& value = parameters_.of(fit_.hypothesis, j);
     value = parameters_.clamped(j, value);
@@ -86,15 +131,12 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
 }
 
 GaussNewton::NormalEquations GaussNewton::normal_equations() {
-  // where the last step gained what it promised, the voltage is linear: its derivatives are still good
-  const bool fresh = !as_promised_ || j_theta_.cols() != m_;
-  if (fresh) j_theta_ = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
-  derivatives_age_ = fresh ? 0 : derivatives_age_ + 1;
+  Columns j_theta = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
   for (Eigen::Index j = 0; j < m_; ++j) {
     natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
-    if (fresh) j_theta_.col(j) *= natural_[j];
+    j_theta.col(j) *= natural_[j];
   }
-  const Columns &j_u = around_->columns, &j_theta = j_theta_;
+  const Columns& j_u = around_->columns;
   NormalEquations e;
   e.u_gradient = j_u.transpose() * fit_.residual - fit_.calibration;
   e.u_alone = around_->normal.solve(e.u_gradient);
@@ -147,8 +189,6 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
       continue;
     }
     result.better = true;
-    as_promised_ = derivatives_age_ < fit_numerics.derivatives_age_at_most &&
-                   std::abs(fit_.cost - cost - promised) < fit_numerics.as_promised * promised;
     quiet_ = fit_.cost - cost < fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost ? quiet_ + 1 : 0;
     fit_.hypothesis = trial;
     fit_.calibration = u;
@@ -161,45 +201,38 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
 
 /// Linearises in the base parameters at the current point if the fit is far from the last linearisation or a step has
 /// not gained what it promised. Returns false if that is not worth it: the fit has converged.
-bool GaussNewton::linearise_again(const Attempt& attempt) {
+bool GaussNewton::linearise_again(const Attempt& attempt, int iteration, int& iterations) {
   const int most = attempt.astray ? fit_numerics.renewals_astray : fit_numerics.renewals;
   const bool pays = attempt.astray || !attempt.better || cost_at_start_ - fit_.cost > fit_numerics.far_gain;
   if (renewals_ >= most || !pays) return false;
   ++renewals_;
   quiet_ = 0;
-  as_promised_ = false;
   damping_ =
       attempt.astray ? std::max(fit_numerics.damping, damping_ / fit_numerics.damping_restart) : fit_numerics.damping;
   around_ = likelihood_.linearised(fit_.hypothesis, fit_.calibration);
-  iterations_ = std::max(iterations_, iteration_ + fit_numerics.iterations_after_renewal);
+  iterations = std::max(iterations, iteration + fit_numerics.iterations_after_renewal);
   return true;
 }
 
-void GaussNewton::run(int until, double hopeless) {
-  const auto is_hopeless = [&] {
-    return iteration_ >= fit_numerics.iterations_before_hopeless &&
-           fit_.cost - fit_numerics.hopeless_times * within_reach_ > hopeless;
-  };
-  for (; iteration_ < std::min(iterations_, until) && !fit_.converged && !is_hopeless(); ++iteration_) {
+HypothesisFit GaussNewton::run(int iterations, double hopeless) {
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     const NormalEquations equations = normal_equations();
-    within_reach_ = equations.within_reach;
-    if (within_reach_ < fit_numerics.within_reach) {
+    if (equations.within_reach < fit_numerics.within_reach) {
       fit_.converged = true;
       break;
     }
-    if (is_hopeless()) break;
+    if (iteration >= fit_numerics.iterations_before_hopeless &&
+        fit_.cost - fit_numerics.hopeless_times * equations.within_reach > hopeless)
+      break;
     const Attempt attempt = attempt_step(equations);
     const bool renewable = attempt.astray && renewals_ < fit_numerics.renewals_astray;
     if (attempt.better && quiet_ == 0 && !renewable) continue;
-    if (linearise_again(attempt)) continue;
-    fit_.converged = attempt.better || derivatives_age_ == 0;
-    as_promised_ = false;
+    if (linearise_again(attempt, iteration, iterations)) continue;
+    fit_.converged = true;
+    break;
   }
-}
-
-HypothesisFit GaussNewton::result() && {
   finish();
-  return std::move(fit_);
+  return fit_;
 }
 
 /// Bounds reached, covariance and standard deviations.
@@ -237,9 +270,7 @@ HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) cons
 
 HypothesisFit LikelihoodModel::fit(const Hypothesis& start, const Eigen::VectorXd& calibration, int iterations,
                                    double hopeless) const {
-  GaussNewton fit(*this, start, calibration, iterations);
-  fit.run(numerics.fit.no_limit, hopeless);
-  return std::move(fit).result();
+  return GaussNewton(*this, start, calibration).run(iterations, hopeless);
 }
 
 }  // namespace bms::diagnosis

@@ -30,10 +30,6 @@ struct Numerics {
     double calibration_way = 0.02;             ///< the base parameters' step shrinks as 1 / (1 + this damping)
     double within_reach = 0.2;                 ///< possible gain below which a fit has converged
     double hopeless_times = 2;                 ///< of the possible gain that a step is given credit for
-    double hopeless_share = 0.05;              ///< of the gain of the best, by which a candidate may be behind as well
-    double as_promised = 0.1;                  ///< share by which a gain may differ from the promised one where the
-    int derivatives_age_at_most = 2;           ///< derivatives are kept, for so many iterations
-    int no_limit = 1'000'000;                  ///< iterations that are never reached
     double kept_promise = 0.3;                 ///< share of the promised gain below which a step has gone astray,
     double promise = 2, promise_share = 1e-3;  ///< if it promised more than this and this share of the cost
     double quiet = 0.05, quiet_share = 1e-5;   ///< gain below which an iteration changes nothing

@@ -116,36 +116,19 @@ double Search::gain(const HypothesisFit& less, const HypothesisFit& more) {
          known_beforehand(facts, more.hypothesis);
 }
 
-Search::Begun Search::begin_fits(const HypothesisFit& around, const Candidate& c, const HypothesisFit* before) const {
+HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, double hopeless) {
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
-  Begun begun;
-  const auto begin = [&](const Hypothesis& start, const Eigen::VectorXd& u) {
-    begun.push_back(std::make_unique<GaussNewton>(likelihood_, start, u, numerics.fit.iterations));
-    begun.back()->run(numerics.fit.iterations_before_hopeless);
-  };
-  if (before != nullptr) {
-    begin(before->hypothesis, before->calibration);
-    return begun;
-  }
-  begin(h, around.calibration);
+  HypothesisFit best = likelihood_.fit(h, around.calibration, numerics.fit.iterations, hopeless);
   for (const Eigen::VectorXd& u : far_bases(around)) {
-    if (const auto farther = far_start(h, u)) begin(*farther, u);
+    const auto farther = far_start(h, u);
+    if (!farther) continue;
+    HypothesisFit other = likelihood_.fit(*farther, u, numerics.fit.iterations, hopeless);
+    if (other.cost < best.cost) best = std::move(other);
   }
-  std::sort(begun.begin(), begun.end(), [](const auto& a, const auto& b) { return a->cost() < b->cost(); });
-  return begun;
-}
-
-HypothesisFit Search::finish_fits(Begun begun, const Candidate& c, double hopeless) {
-  std::optional<HypothesisFit> best;
-  for (std::unique_ptr<GaussNewton>& fit : begun) {
-    if (!stopped()) fit->run(numerics.fit.no_limit, best ? std::min(hopeless, best->cost) : hopeless);
-    if (!best || fit->cost() < best->cost) best = std::move(*fit).result();
-    fit.reset();
-  }
-  if (knowledge_of(c.mechanism).signature == Signature::contact_change) best = refined_onset(*best);
+  if (knowledge_of(c.mechanism).signature == Signature::contact_change) best = refined_onset(best);
   report(catalogue[c.mechanism].id);
-  return *std::move(best);
+  return best;
 }
 
 std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) const {
@@ -218,7 +201,7 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
       if (!promising && !far_better(from, c)) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
-    const std::vector<HypothesisFit> here = fitted(from, worth, {std::numeric_limits<double>::infinity(), fits});
+    const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
     fits.insert(fits.end(), here.begin(), here.end());
   }
   std::stable_sort(fits.begin(), fits.end(),
@@ -243,30 +226,19 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
         all[a].gain >= std::max(candidate_limits.worth_a_fit, candidate_limits.rival_share * r.gain))
       worth.push_back(all[a]);
   }
-  return fitted(from, worth, {r.best.cost + search_limits.hopeless, {}});
+  return fitted(from, worth, r.best.cost + search_limits.hopeless);
 }
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
-                                          const Against& against) {
-  const double hopeless = against.hopeless;
+                                          double hopeless) {
   std::vector<HypothesisFit> fits(candidates.size());
   // the fits share a linearisation, as several run at once
   if (!around.hypothesis.added().empty())
     likelihood_.linearise(around.hypothesis, around.calibration);
   else if (!likelihood_.has_linearisation())
     likelihood_.linearise(likelihood_.base(), likelihood_.unchanged());
-  std::vector<Begun> begun(candidates.size());
   measurement::in_parallel(candidates.size(), [&](std::size_t k) {
-    const auto before = std::find_if(against.before.begin(), against.before.end(), [&](const HypothesisFit& f) {
-      return f.hypothesis.settings.back().index == candidates[k].mechanism;
-    });
-    if (!stopped()) begun[k] = begin_fits(around, candidates[k], before == against.before.end() ? nullptr : &*before);
-  });
-  double least = around.cost;
-  for (const Begun& b : begun) least = b.empty() ? least : std::min(least, b.front()->cost());
-  const double behind = least + std::max(search_limits.hopeless, numerics.fit.hopeless_share * (around.cost - least));
-  measurement::in_parallel(candidates.size(), [&](std::size_t k) {
-    if (!begun[k].empty()) fits[k] = finish_fits(std::move(begun[k]), candidates[k], std::min(hopeless, behind));
+    if (!stopped()) fits[k] = fit_with(around, candidates[k], hopeless);
   });
   std::erase_if(fits, [](const HypothesisFit& f) { return f.residual.size() == 0; });
   std::stable_sort(fits.begin(), fits.end(),

@@ -4,14 +4,12 @@
 #include <array>
 #include <functional>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "diagnosis/gauss_newton.hpp"
 #include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/screen.hpp"
 
@@ -74,13 +72,8 @@ class Search {
  private:
   /// -2 log posterior with the noise model that the residual makes most probable, at its price.
   double total(const HypothesisFit& f) const;
-  /// Fits of one candidate from its estimate and from far starts, that which is ahead first.
-  using Begun = std::vector<std::unique_ptr<GaussNewton>>;
-  /// A candidate added to what is there: the first iterations from each start. before: its fit with another noise
-  /// model, from which it then begins; nullptr if it has no such fit. Called from several threads.
-  Begun begin_fits(const HypothesisFit& around, const Candidate& c, const HypothesisFit* before) const;
-  /// The best of them, fitted to the end. Called from several threads.
-  HypothesisFit finish_fits(Begun begun, const Candidate& c, double hopeless);
+  /// A candidate added to what is there, fitted from its estimate and from far starts. Called from several threads.
+  HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
   /// The best of some strengths far from the signature's estimate; nothing if none is better than it.
   std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u) const;
   /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
@@ -90,14 +83,10 @@ class Search {
   bool far_better(const HypothesisFit& around, const Candidate& c);
   /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best) const;
-  struct Against {
-    double hopeless;                           ///< cost above which a fit need not end
-    const std::vector<HypothesisFit>& before;  ///< fits of some of the candidates with another noise model
-  };
   /// The candidates fitted, by cost; the foremost with the noise that they leave, which is smaller if much is
   /// explained.
   std::vector<HypothesisFit> fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
-                                    const Against& against);
+                                    double hopeless);
 
   LikelihoodModel& likelihood_;
   const Progress& progress_;
