@@ -14,7 +14,6 @@ namespace bms::files {
 namespace {
 
 constexpr std::size_t most_preamble_lines = 300;  ///< before the header: an EC-Lab file has about 60
-constexpr std::size_t longest_quote = 40;         ///< characters
 
 char separator_of(std::string_view line, const ReadOptions& options) {
   if (options.separator == "tab" || options.separator == "\\t") return '\t';
@@ -55,12 +54,12 @@ class HeaderFinder {
     }
   }
 
-  std::optional<TableLayout> header(std::string_view line) const {
+  std::optional<TableLayout> header(std::string_view line, std::size_t number) const {
     TableLayout layout;
     layout.separator = separator_of(line, options_);
     for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
     if (!take_maps(layout)) return std::nullopt;
-    if (own_names(layout)) return finished(std::move(layout));
+    if (own_names(layout)) return finished(std::move(layout), number);
     for (const LogFormat& format : log_formats()) {
       if (!options_.format.empty() && format.name != options_.format) continue;
       if (options_.format.empty() && !format.marks.empty() && !marked(format, layout)) continue;
@@ -68,7 +67,7 @@ class HeaderFinder {
       tried.format = &format;
       tried.own = false;
       detect(tried);
-      if (complete(tried)) return finished(std::move(tried));
+      if (complete(tried)) return finished(std::move(tried), number);
     }
     return std::nullopt;
   }
@@ -79,31 +78,29 @@ class HeaderFinder {
     for (const std::string_view part : split(line, separator_of(line, options_))) layout.headings.emplace_back(part);
     int named = 0;
     for (const Quantity quantity : {Quantity::time, Quantity::current, Quantity::voltage})
-      named += heading_that_is(layout, quantity).empty() ? 0 : 1;
+      named += column_of(layout, quantity).first.empty() ? 0 : 1;
     return named;
   }
 
   /// Says what the line lacks as a header.
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
+    TableLayout layout;
+    for (const std::string_view part : split(line, separator_of(line, options_))) layout.headings.emplace_back(part);
     for (const auto& [target, column] : maps_) {
+      if (heading_named(layout, column)) continue;
       throw BadInput(path_, number,
                      fmt::format("no column {} in {}, expected the column that --map {} names", in_quotes(column),
                                  in_quotes(line), name_of(target)));
     }
-    TableLayout layout;
-    layout.separator = separator_of(line, options_);
-    for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
-    own_names(layout);
+    take_maps(layout);
+    layout.format = format_of(layout);
     std::optional<Quantity> missing;
     for (const Quantity quantity : {Quantity::time, Quantity::current, Quantity::voltage}) {
-      const std::string heading = heading_that_is(layout, quantity);
-      if (missing || (!heading.empty() && quantity == Quantity::time)) continue;
+      const auto [heading, target] = column_of(layout, quantity);
       if (heading.empty())
-        missing = quantity;
-      else if (const Heading parts = heading_of(heading); !target_of(heading) && parts.unit.empty())
-        throw BadInput(path_, number,
-                       fmt::format("column {} states no unit, expected --unit {}=UNIT with one of: {}",
-                                   in_quotes(heading), name_of({quantity, 0}), units_of(quantity)));
+        missing = missing.value_or(quantity);
+      else if (!missing && !has(layout, target) && !target_of(heading))
+        refuse_unit(layout, heading, target, number);
     }
     const std::string name = name_of({missing.value_or(Quantity::voltage), 0});
     throw BadInput(path_, number,
@@ -113,30 +110,81 @@ class HeaderFinder {
   }
 
  private:
-  /// The heading that names this quantity, with or without a unit; a pack's or a cell's voltage is a voltage.
-  static std::string heading_that_is(const TableLayout& layout, Quantity quantity) {
+  /// Throws if the unit of this heading is not known.
+  void refuse_unit(const TableLayout& layout, const std::string& text, const Target& target, std::size_t number) const {
+    const Heading heading = heading_of(text);
+    const Quantity quantity = target.quantity;
+    const bool cell = quantity == Quantity::cell_voltage;
+    if (cell ? scale_of(quantity, heading.unit).has_value() : unit_known(layout, quantity, heading)) return;
+    const std::string states = heading.unit.empty()
+                                   ? "states no unit"
+                                   : fmt::format("has the unit {}, which is not known", in_quotes(heading.unit));
+    const std::string expected =
+        cell ? fmt::format("--map {}=COLUMN for each cell, which reads it in V", name_of(target))
+             : fmt::format("--unit {}=UNIT with one of: {}", name_of(target), units_of(quantity));
+    throw BadInput(path_, number, fmt::format("column {} {}, expected {}", in_quotes(text), states, expected));
+  }
+
+  /// The heading that names this quantity, with or without a unit, and what it is: a pack's or a cell's voltage is a
+  /// voltage, too. Without a heading its text is empty.
+  static std::pair<std::string, Target> column_of(const TableLayout& layout, Quantity quantity) {
+    for (const SourceColumn& c : layout.columns) {
+      const bool voltage = c.target.quantity == Quantity::pack_voltage || c.target.quantity == Quantity::cell_voltage;
+      if (c.target.quantity == quantity || (quantity == Quantity::voltage && voltage)) return {c.heading, c.target};
+    }
     for (const std::string& heading : layout.headings) {
       const std::string base = heading_of(heading).base;
       const auto is = [&](Quantity q) { return rank_of(q, base) >= 0 || target_of(heading) == Target{q, 0}; };
-      if (is(quantity)) return heading;
+      if (is(quantity)) return {heading, {quantity, 0}};
       if (quantity != Quantity::voltage) continue;
-      if (is(Quantity::pack_voltage) || cell_number(Quantity::cell_voltage, base) > 0) return heading;
+      if (is(Quantity::pack_voltage)) return {heading, {Quantity::pack_voltage, 0}};
+      if (const std::size_t k = cell_number(Quantity::cell_voltage, base))
+        return {heading, {Quantity::cell_voltage, k}};
     }
     return {};
+  }
+
+  /// The format whose marks the headings have; any table otherwise.
+  static const LogFormat* format_of(const TableLayout& layout) {
+    for (const LogFormat& format : log_formats()) {
+      if (marked(format, layout)) return &format;
+    }
+    return log_format("csv");
+  }
+
+  /// Index of the heading with this text, or else with this name without its unit.
+  static std::optional<std::size_t> heading_named(const TableLayout& layout, const std::string& column) {
+    const auto& all = layout.headings;
+    auto at = std::find(all.begin(), all.end(), column);
+    if (at == all.end())
+      at = std::find_if(all.begin(), all.end(), [name = normalised(column)](const std::string& heading) {
+        return heading_of(heading).base == name;
+      });
+    if (at == all.end()) return std::nullopt;
+    return static_cast<std::size_t>(at - all.begin());
   }
 
   /// Returns false if the line lacks a column that the user named.
   bool take_maps(TableLayout& layout) const {
     for (const auto& [target, column] : maps_) {
-      auto at = std::find(layout.headings.begin(), layout.headings.end(), column);
-      if (at == layout.headings.end()) {  // the name without its unit
-        at = std::find_if(layout.headings.begin(), layout.headings.end(),
-                          [&](const std::string& heading) { return heading_of(heading).base == normalised(column); });
-      }
-      if (at == layout.headings.end()) return false;
-      add(layout, static_cast<std::size_t>(at - layout.headings.begin()), target);
+      const auto at = heading_named(layout, column);
+      if (!at) return false;
+      add(layout, *at, target);
     }
     return true;
+  }
+
+  /// Throws if another column has the name of one that is used: which of them is meant is not known.
+  void refuse_same_names(const TableLayout& layout, std::size_t number) const {
+    for (const SourceColumn& column : layout.columns) {
+      for (std::size_t k = 0; k < layout.headings.size(); ++k) {
+        if (k == column.index || normalised(layout.headings[k]) != normalised(column.heading)) continue;
+        throw BadInput(
+            path_, number,
+            fmt::format("columns {} ({} and {}) have the same name, expected one of them", in_quotes(column.heading),
+                        std::min(k, column.index) + 1, std::max(k, column.index) + 1));
+      }
+    }
   }
 
   void add(TableLayout& layout, std::size_t index, const Target& target) const {
@@ -237,7 +285,8 @@ class HeaderFinder {
            layout.find(Quantity::pack_voltage) != nullptr;
   }
 
-  std::optional<TableLayout> finished(TableLayout layout) const {
+  std::optional<TableLayout> finished(TableLayout layout, std::size_t number) const {
+    refuse_same_names(layout, number);
     for (const auto& [target, unit] : units_) {
       const auto scale = scale_of(target.quantity, unit);
       for (SourceColumn& column : layout.columns) {
@@ -265,33 +314,6 @@ class HeaderFinder {
 };
 
 }  // namespace
-
-std::string in_quotes(std::string_view text) {
-  std::string out;
-  for (const char c : text.substr(0, longest_quote)) out += c >= ' ' && c <= '~' ? c : '?';
-  return "'" + out + (text.size() > longest_quote ? "..." : "") + "'";
-}
-
-std::string_view trimmed(std::string_view text) {
-  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
-  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
-  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
-  return text;
-}
-
-std::vector<std::string_view> split(std::string_view line, char separator) {
-  std::vector<std::string_view> parts;
-  const bool quotes = line.find('"') != std::string_view::npos;
-  std::size_t begin = 0;
-  bool quoted = false;
-  for (std::size_t k = 0; k <= line.size(); ++k) {
-    if (k < line.size() && quotes && line[k] == '"') quoted = !quoted;
-    if (k < line.size() && (quoted || line[k] != separator)) continue;
-    parts.push_back(trimmed(line.substr(begin, k - begin)));
-    begin = k + 1;
-  }
-  return parts;
-}
 
 const SourceColumn* TableLayout::find(Quantity quantity) const {
   const auto at = std::find_if(columns.begin(), columns.end(),
@@ -337,11 +359,11 @@ TableLayout find_header(TextLines& lines, const std::string& path, bool voltage,
   for (std::size_t k = 0; k < most_preamble_lines && lines.next(line);) {
     const std::string_view content = trimmed(line);
     if (content.empty()) continue;
-    if (auto layout = finder.header(content.front() == '#' ? std::string_view{} : line)) return *layout;
+    if (auto layout = finder.header(content.front() == '#' ? std::string_view{} : line, lines.number())) return *layout;
     if (content.front() == '~' || content.front() == '#') continue;
     const std::string both = with_units(before, previous, line, separator_of(line, options));
     if (!both.empty()) {
-      if (auto layout = finder.header(both)) return *layout;
+      if (auto layout = finder.header(both, lines.number() - 1)) return *layout;
     }
     before = previous;
     previous = line;

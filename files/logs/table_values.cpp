@@ -13,6 +13,8 @@ namespace bms::files {
 
 namespace {
 
+constexpr std::size_t longest_quote = 40;  ///< characters
+
 bool has_letter_only(std::string_view text) {
   return !text.empty() && std::none_of(text.begin(), text.end(), [](unsigned char c) { return std::isdigit(c) != 0; });
 }
@@ -48,6 +50,33 @@ std::string column_text(const SourceColumn& column, bool base_units) {
 }
 
 }  // namespace
+
+std::string in_quotes(std::string_view text) {
+  std::string out;
+  for (const char c : text.substr(0, longest_quote)) out += c >= ' ' && c <= '~' ? c : '?';
+  return "'" + out + (text.size() > longest_quote ? "..." : "") + "'";
+}
+
+std::string_view trimmed(std::string_view text) {
+  while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) text.remove_prefix(1);
+  while (!text.empty() && (text.back() == ' ' || text.back() == '\t' || text.back() == '\r')) text.remove_suffix(1);
+  if (text.size() >= 2 && text.front() == '"' && text.back() == '"') text = text.substr(1, text.size() - 2);
+  return text;
+}
+
+std::vector<std::string_view> split(std::string_view line, char separator) {
+  std::vector<std::string_view> parts;
+  const bool quotes = line.find('"') != std::string_view::npos;
+  std::size_t begin = 0;
+  bool quoted = false;
+  for (std::size_t k = 0; k <= line.size(); ++k) {
+    if (k < line.size() && quotes && line[k] == '"') quoted = !quoted;
+    if (k < line.size() && (quoted || line[k] != separator)) continue;
+    parts.push_back(trimmed(line.substr(begin, k - begin)));
+    begin = k + 1;
+  }
+  return parts;
+}
 
 bool settle(TableLayout& layout, std::string_view line, const std::string& path, std::size_t number,
             const ReadOptions& options) {

@@ -1,4 +1,5 @@
 // bms import as a user calls it: every sample of log_samples is read with the right values, or refused with the reason.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -189,6 +190,56 @@ TEST_F(ImportFiles, EveryCommandThatReadsARecordingTakesTheSameOptions) {
   EXPECT_THAT(run_tool("hil --help").out, HasSubstr("--discharge-positive"));
   const ToolRun inverted = run_tool("replay " + csv + how + "--charge-positive");
   EXPECT_EQ(inverted.exit_code, 2);
+}
+
+/// Each refusal names an option; with it the next one is another, until the log is read.
+TEST_F(ImportFiles, ARefusedHeaderIsReadAfterWhatTheRefusalsAskFor) {
+  const auto rows = [](const std::string& header, const char* format) {
+    std::string text = header + "\n";
+    for (const Row& r : log_samples::signal())
+      text += fmt::format(fmt::runtime(format), r.time_s, r.current_a, r.voltage_v) + "\n";
+    return text;
+  };
+  const auto says = [](const std::string& log, const std::string& options) {
+    const ToolRun run = run_tool("import " + log + " " + options);
+    return run.exit_code == 0 ? "read" : run.err;
+  };
+  const std::string names = write("names.csv", rows("Time (s),i_batt,u_cell", "{},{},{}"));
+  EXPECT_THAT(says(names, ""), HasSubstr("expected --unit current_a=UNIT"));
+  EXPECT_THAT(says(names, "--unit current_a=A"), HasSubstr("--map voltage_v=COLUMN"));
+  EXPECT_EQ(says(names, "--unit current_a=A --map voltage_v=u_cell"), "read");
+  const std::string daly = write("daly.csv", rows("Time (s),Current,SumVoltage", "{},{},5{}"));
+  EXPECT_THAT(says(daly, "--map pack_voltage_v=SumVoltage"), HasSubstr("expected --unit current_a=UNIT"));
+  EXPECT_EQ(says(daly, "--map pack_voltage_v=SumVoltage --unit current_a=A --series 16"), "read");
+  EXPECT_THAT(says(daly, "--unit current_a=A"), HasSubstr("expected --unit pack_voltage_v=UNIT"));
+  EXPECT_EQ(says(daly, "--unit current_a=A --unit pack_voltage_v=V --series 16"), "read");
+  const std::string cells = write("cells.csv", rows("Time (s),Current (A),Cell 1", "{},{},{}"));
+  EXPECT_THAT(says(cells, ""), HasSubstr("column 'Cell 1' states no unit, expected --map v_1=COLUMN"));
+  EXPECT_EQ(says(cells, "'--map=v_1=Cell 1'"), "read");
+  const std::string unknown = write("unknown.csv", rows("Time (s),Current (foo),Voltage (V)", "{},{},{}"));
+  EXPECT_THAT(says(unknown, ""), HasSubstr("column 'Current (foo)' has the unit 'foo', which is not known, expected "
+                                           "--unit current_a=UNIT with one of: A"));
+  EXPECT_EQ(says(unknown, "--unit current_a=A"), "read");
+  EXPECT_THAT(says(write("time.csv", rows("Time (foo),Current (A),Voltage (V)", "{},{},{}")), ""),
+              HasSubstr("has the unit 'foo', which is not known, expected --unit time_s=UNIT"));
+  EXPECT_THAT(says(write("arbin.csv", rows("Data_Point,Test_Time,Current", "{},{},{}")), ""),
+              HasSubstr("no column 'voltage_v'"))
+      << "the format states the unit of the current";
+}
+
+TEST_F(ImportFiles, TwoColumnsWithTheNameThatIsUsedAreRefused) {
+  const auto says = [&](const std::string& header, const std::string& options = "") {
+    std::string text = header + "\n";
+    for (const Row& r : log_samples::signal())
+      text += fmt::format("{},{},{},1,5\n", r.time_s, r.current_a, r.voltage_v);
+    const ToolRun run = run_tool("import " + write("a.csv", text) + " " + options);
+    return run.exit_code == 0 ? "read" : run.err;
+  };
+  EXPECT_THAT(says("Time (s),Current (A),Voltage (V),State,Voltage (V)"),
+              HasSubstr("a.csv:1: columns 'Voltage (V)' (3 and 5) have the same name, expected one of them"));
+  EXPECT_THAT(says("Time (s),I,Volt,State,Volt", "--map voltage_v=Volt --unit current_a=A"),
+              HasSubstr("columns 'Volt' (3 and 5) have the same name"));
+  EXPECT_EQ(says("Time (s),Current (A),Voltage (V),Power,Power"), "read") << "not used";
 }
 
 /// Four cells of table9's kind at different states of charge, where its OCV is steep.
