@@ -19,6 +19,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using workflow::Ammeter;
+using workflow::amperes;
 using workflow::SensorFinding;
 
 struct AmmeterOptions {
@@ -30,10 +31,6 @@ struct AmmeterOptions {
 };
 
 constexpr double most_offset_a = 5, most_gain = 0.05;  ///< that the firmware accepts (firmware/commands.hpp)
-
-std::string amperes(double a) {
-  return std::abs(a) < 1 ? fmt::format("{:.0f} mA", 1e3 * a) : fmt::format("{:.2f} A", a);
-}
 
 std::string offset_text(const SensorFinding& f) {
   if (!f.value) return f.why;
@@ -61,6 +58,7 @@ std::vector<std::pair<std::string, std::string>> corrections_of(const AmmeterOpt
   const workflow::AmmeterCorrection c = workflow::correction_of(ammeter);
   std::vector<std::pair<std::string, std::string>> lines;
   if (c.empty()) return lines;
+  if (c.offset_a != 0 && !ammeter.offset_a.why.empty()) lines.emplace_back("condition", ammeter.offset_a.why);
   if (std::abs(c.gain) > most_gain || std::abs(c.offset_a) > most_offset_a) {
     lines.emplace_back("this firmware",
                        "none: more than 5 % or 5 A is a wrong part, not a tolerance; replace the sensor");

@@ -18,11 +18,12 @@ namespace bms::workflow {
 namespace {
 
 constexpr std::size_t fewest_readings = 30, fewest_values = 10, fewest_clipped = 20, fewest_episodes = 3;
-constexpr double same_reading = 0.002;  ///< of the largest: such readings are at the end of the range
-constexpr double high_reading = 0.8;    ///< of the largest: readings to compare the clipped ones with
-constexpr double significant = 3;       ///< standard deviations, for a claim that something is there
-constexpr double correlated_s = 60;     ///< errors of a meter are taken as correlated for so long
-constexpr double steps_of_a_gap = 5;    ///< a gap around zero of fewer steps of the reading is its resolution
+constexpr double same_reading = 0.002;   ///< of the largest: such readings are at the end of the range
+constexpr double high_reading = 0.8;     ///< of the largest: readings to compare the clipped ones with
+constexpr double significant = 3;        ///< standard deviations, for a claim that something is there
+constexpr double nothing_beyond = 0.05;  ///< of the largest: if less than that would show, there is no clipping
+constexpr double correlated_s = 60;      ///< errors of a meter are taken as correlated for so long
+constexpr double steps_of_a_gap = 5;     ///< a gap around zero of fewer steps of the reading is its resolution
 
 bool known(double a) { return std::isfinite(a); }
 
@@ -146,10 +147,15 @@ void find_clipping(const measurement::Recording& r, const Readings& all, const s
   const double beyond = high.value - low.value, std = std::hypot(high.std, low.std);
   const double claimed_a = all.largest > 0 ? beyond : -beyond;
   const double scatter_a = low.std * std::sqrt(static_cast<double>(below.size()));  // of single readings
-  if (claimed_a > significant * std && claimed_a > 2 * scatter_a) {
+  const double visible_a = std::max(significant * std, 2 * scatter_a);
+  if (claimed_a > visible_a) {
     found.value = {all.largest, all.step};
     ammeter.missed_a = beyond;
     found.why = fmt::format("the current goes {:.3g} +- {:.2g} A beyond it on average", std::abs(beyond), std);
+  } else if (visible_a > nothing_beyond * std::abs(all.largest)) {
+    found.why = fmt::format(
+        "not visible here: up to {:.3g} A beyond {:.4g} A would not show, because the comparison scatters as much",
+        visible_a, std::abs(all.largest));
   } else {
     found.why = fmt::format("none: {} readings of {:.4g} A, and the current does not go beyond it", rows, all.largest);
   }
@@ -277,16 +283,21 @@ Ammeter examine_ammeter(const measurement::Recording& recording, const files::Ce
     ammeter.clipping_a.why = found.offset_a.why;
   else
     find_clipping(recording, all, beyond_by_voltage(found, mean_r0_ohm(found, cell)), ammeter);
+  const double known_to_a = ammeter.offset_a.value ? ammeter.offset_a.value->std : 0;
   if (ammeter.clipping_a.value) {
     ammeter.offset_a = {{},
                         "not visible here: the readings are clipped, and the charge beyond is missing in the count"};
     ammeter.gain = ammeter.offset_a;
-  } else if (ammeter.dead_band_a.value) {
-    ammeter.offset_a = {{}, "not visible here: the charge of currents in the dead band is missing in the count"};
+  } else if (ammeter.dead_band_a.value && ammeter.dead_band_a.value->value > known_to_a) {
+    ammeter.offset_a = {{}, "not visible here: the charge of currents in the dead band may be missing in the count"};
     ammeter.gain = ammeter.offset_a;
   }
   if (!ammeter.offset_a.value) offset_at_rest(recording, cell, ammeter);
   return ammeter;
+}
+
+std::string amperes(double a) {
+  return std::abs(a) < 1 ? fmt::format("{:.0f} mA", 1e3 * a) : fmt::format("{:.2f} A", a);
 }
 
 AmmeterCorrection correction_of(const Ammeter& ammeter) {

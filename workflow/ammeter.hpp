@@ -28,6 +28,9 @@ struct SensorFinding {
   std::string why;  ///< without a value: why, and what would show it; with one: a remark, or empty
 };
 
+/// "-25 mA", "1.30 A".
+std::string amperes(double a);
+
 struct Ammeter {
   bool by_reference = false;  ///< by a trusted meter, not by the cell
   SensorFinding offset_a;     ///< reading at a current of 0

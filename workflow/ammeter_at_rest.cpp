@@ -51,6 +51,11 @@ SensorFinding reading_at_rest(const measurement::Recording& r, const files::Cell
   SensorFinding found;
   const double capacity_ah = cell.parameters.capacity_ah;
   const double band_a = std::max(constant_c * capacity_ah, noise_sigmas * cell.parameters.noise.current_a);
+  if (std::none_of(r.current_a.begin(), r.current_a.end(),
+                   [&](double a) { return std::abs(a) >= rest_c * capacity_ah; })) {
+    found.why = "no reading is a load, so a small constant current looks like an offset";
+    return found;
+  }
   const std::vector<Rest> rests = rests_of(r, rest_c * capacity_ah, band_a);
   if (rests.size() < fewest_rests) {
     found.why = "half an hour of rest in which nothing is connected would show it";

@@ -128,6 +128,7 @@ class Fit {
     return scale_ * std::max(std::sqrt(chi2), rms(values) / expected_rms_);
   }
   /// Standard deviations of the noise in those of the cell file.
+  double scale() const { return scale_; }
   void set_scale(double scale) { scale_ = scale; }
   double rms(const Values& values) const {
     const Vector e = block_errors(row_errors(values));
@@ -262,10 +263,6 @@ class Fit {
   bool exact_gain_ = false;
 };
 
-std::string amperes(double a) {
-  return std::abs(a) < 1 ? fmt::format("{:.0f} mA", 1e3 * a) : fmt::format("{:.2f} A", a);
-}
-
 /// Places from which the fit begins: over all states of charge and offsets, those whose voltage is nearest to the
 /// measured one, none close to another.
 std::vector<Values> starts_of(const Fit& fit) {
@@ -332,7 +329,9 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   const auto results = results_of(fit);
   const Values& best = results.front().values;
   const auto covariance = fit.covariance(best);
-  const auto std_of = [&](Unknown u) { return std::sqrt(covariance(u, u)); };
+  // the noise was scaled by another result, or not to the end
+  const double excess = fit.excess(best), widened = std::max(1.0, excess / fit.scale());
+  const auto std_of = [&](Unknown u) { return widened * std::sqrt(covariance(u, u)); };
   found.residual_v = fit.rms(best);
   found.error_v = fit.row_errors(best, recording);
   found.r0_times = 1 + best[r0];
@@ -346,7 +345,7 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   const auto other = std::find_if(results.begin(), results.end(), [&](const Fit::Result& r) {
     return r.cost < results.front().cost + same_cost && std::abs(r.values[offset] - best[offset]) > 3 * offset_a.std;
   });
-  if (fit.excess(best) > worst_scale)
+  if (excess > worst_scale)
     found.offset_a.why = fmt::format(
         "the cell file does not describe this log, it is off by {:.1f} mV RMS; "
         "bms diagnose finds why",

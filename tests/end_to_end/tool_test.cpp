@@ -159,6 +159,19 @@ TEST_F(Tool, AMechanismFromACellFileOrFromTheCommandLineIsSimulatedAndReplayed) 
                                "v,slow_polarisation_2_v,flags\n"));
 }
 
+/// Rests of ten minutes between loads, with a voltage that no cell file describes.
+TEST_F(Tool, ACorrectionOfTheCurrentByItsReadingAtRestStatesItsCondition) {
+  std::string log = "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 3'600; ++k)
+    log += std::to_string(k) + (k % 1'200 < 600 ? ",-0.10" : ",-2.0") + std::to_string(k % 3) + ",3." +
+           std::to_string(k % 7) + "\n";
+  const ToolRun run = run_tool("ammeter " + write("log.csv", log) + " --json " + path("a.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("CURRENT_MEASURED_BY_USER"));
+  EXPECT_THAT(run.out, HasSubstr("\ncondition: if no current flows during the 30 minutes of rest"));
+  EXPECT_THAT(content(path("a.json")), HasSubstr("\"where\": \"condition\""));
+}
+
 TEST_F(Tool, AShiftOfTheInitialSocIsAddedToThePrior) {
   const std::string input = "simulate --cell table9 --recording " + shift + " --quiet --out ";
   run_tool(input + path("a.csv") + " --initial-soc 0.9 --with initial_soc:shift=0.05");

@@ -15,6 +15,7 @@ namespace bms::workflow {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 struct SensorErrors {
   double offset_a = 0, gain = 0, dead_band_a = 0, largest_a = 1e9;
@@ -108,6 +109,18 @@ TEST(Ammeter, ConstantPulsesOfACellWithAnotherResistanceAreNotClipped) {
   EXPECT_FALSE(a.clipping_a.value) << a.clipping_a.why;
 }
 
+TEST(Ammeter, ASlowConstantDischargeIsNotAnOffset) {
+  measurement::Recording r;
+  for (int k = 0; k < 3'000; ++k) {
+    r.time_s.edit().push_back(10.0 * k);
+    r.current_a.edit().push_back(-0.3 + 0.002 * (k % 3 - 1));
+    r.voltage_v.edit().push_back(3.0 + 0.2 * (k / 300 % 2));  // no cell file describes it
+  }
+  const Ammeter a = examine_ammeter(r, table9(), {});
+  EXPECT_FALSE(a.offset_a.value);
+  EXPECT_THAT(a.offset_a.why, HasSubstr("no reading is a load, so a small constant current looks like an offset"));
+}
+
 /// Three rests of ten minutes between loads; rest_a: what is read then.
 measurement::Recording with_rests(const std::vector<double>& rest_a) {
   measurement::Recording r;
@@ -171,6 +184,39 @@ TEST(Ammeter, AMeterShowsDeadBandAndClipping) {
   EXPECT_NEAR(std::abs(a.clipping_a.value->value), 15, 0.01);
   EXPECT_NEAR(a.gain.value->value, 0, 2e-3) << "clipped readings do not count";
   EXPECT_FALSE(examine_ammeter(meter_check({}), table9(), {}).dead_band_a.value);
+}
+
+TEST(Ammeter, ClippingThatTheScatterHidesIsNotDenied) {
+  auto log = meter_check({.largest_a = 15});
+  for (std::size_t k = 0; k < log.rows(); ++k) log.current_ref_a.edit()[k] += k % 2 == 0 ? 3 : -3;
+  const Ammeter a = examine_ammeter(log, table9(), {});
+  EXPECT_FALSE(a.clipping_a.value);
+  EXPECT_THAT(a.clipping_a.why, HasSubstr("not visible here: up to 6"));
+  EXPECT_THAT(a.clipping_a.why, HasSubstr("A beyond 15 A would not show"));
+}
+
+TEST(Ammeter, ReadingsThatStayAtTheLargestWithoutMoreCurrentAreNotClipped) {
+  auto log = meter_check({});
+  for (std::size_t k = 0; k < log.rows(); ++k)
+    log.current_ref_a.edit()[k] = log.current_a.edit()[k] = std::clamp(log.current_ref_a[k], -15.0, 15.0);
+  EXPECT_THAT(examine_ammeter(log, table9(), {}).clipping_a.why, StartsWith("none: "));
+}
+
+TEST(Ammeter, ADeadBandBelowTheUncertaintyLeavesTheOffset) {
+  auto fine = shift({}, 2, 6, 1);  // readings in fine steps, so that a narrow dead band shows
+  for (std::size_t k = 0; k < fine.rows(); ++k) {
+    const double a = fine.current_a[k] + 0.0025 * std::sin(static_cast<double>(k * k));
+    fine.current_a.edit()[k] = std::abs(a) < 0.012 ? 0 : a;
+  }
+  const Ammeter a = examine_ammeter(fine, table9(), {});
+  ASSERT_TRUE(a.dead_band_a.value) << a.dead_band_a.why;
+  ASSERT_TRUE(a.offset_a.value) << a.offset_a.why;
+  EXPECT_GT(a.offset_a.value->std, a.dead_band_a.value->value);
+  EXPECT_NEAR(a.offset_a.value->value, 0, 3 * std::hypot(a.offset_a.value->std, 0.015));
+  const Ammeter wide = examine_ammeter(shift({.dead_band_a = 0.5}, 2, 6, 1), table9(), {});
+  ASSERT_TRUE(wide.dead_band_a.value) << wide.dead_band_a.why;
+  EXPECT_FALSE(wide.offset_a.value);
+  EXPECT_THAT(wide.offset_a.why, HasSubstr("the charge of currents in the dead band may be missing in the count"));
 }
 
 }  // namespace

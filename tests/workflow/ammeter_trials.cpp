@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -89,13 +90,16 @@ std::string judge(const SensorFinding& found, double truth_a, Tally& tally) {
   return fmt::format("{}{:+.0f} ± {:.0f}", right ? "" : "**wrong** ", 1e3 * found.value->value, 1e3 * found.value->std);
 }
 
-std::string mark(bool claimed, bool there, Tally& tally) {
-  if (!claimed) {
+/// Counts what is said about clipping or a dead band; "none" is an answer, too, and wrong if the error is there.
+std::string mark(const SensorFinding& found, bool there, Tally& tally) {
+  const bool denied = !found.value && found.why.starts_with("none");
+  if (!found.value && !denied) {
     ++tally.silent;
     return "-";
   }
-  ++(there ? tally.right : tally.wrong);
-  return there ? "found" : "**wrong**";
+  const bool right = there != denied;
+  ++(right ? tally.right : tally.wrong);
+  return fmt::format("{}{}", right ? "" : "**wrong** ", denied ? "none" : "found");
 }
 
 std::string row_of(const std::string& name, const Tally& t) {
@@ -115,18 +119,20 @@ Tables tables_of(const std::vector<std::string>& names, bool print) {
     const bool chosen = names.empty() || std::any_of(names.begin(), names.end(), [&](const std::string& part) {
                           return name.find(part) != std::string::npos;
                         });
-    if (!chosen || !std::filesystem::exists(c.recording)) continue;
+    if (!chosen) continue;
+    if (!std::filesystem::exists(c.recording)) throw std::runtime_error("no recording " + c.recording.string());
     const files::CellFile cell = files::read_cell(c.cell);
     const measurement::Recording clean = files::read_recording(c.recording.string());
     for (std::size_t k = 0; k < std::size(planted); ++k) {
       const Planted& p = planted[k];
       const double capacity_ah = cell.parameters.capacity_ah;
       const Ammeter a = workflow::examine_ammeter(with(clean, p, capacity_ah), cell, {});
-      const bool clipped = p.largest_share<1, banded = p.dead_band_share> 0;
+      const bool clipped = p.largest_share < 1;
+      const bool banded = p.dead_band_share > 0;
       const std::string row = fmt::format("| {} | {} ({}) | {} | {} | {} | {} |\n", name, c.cell, c.remark, p.name,
                                           judge(a.offset_a, p.offset_c * capacity_ah, offsets[k]),
-                                          mark(a.clipping_a.value.has_value(), clipped, clipping[clipped ? 1 : 0]),
-                                          mark(a.dead_band_a.value.has_value(), banded, dead_band[banded ? 1 : 0]));
+                                          mark(a.clipping_a, clipped, clipping[clipped ? 1 : 0]),
+                                          mark(a.dead_band_a, banded, dead_band[banded ? 1 : 0]));
       out.offsets += row;
       if (print) fmt::print("{}", row);
       std::fflush(stdout);
@@ -141,6 +147,7 @@ Tables tables_of(const std::vector<std::string>& names, bool print) {
 }
 
 int run(const std::vector<std::string>& names, bool write) {
+  if (write && !names.empty()) throw std::runtime_error("--write takes no names: the page has all recordings");
   const Tables tables = tables_of(names, !write);
   if (!write) {
     fmt::print("\n{}", tables.summary);
