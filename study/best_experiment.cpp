@@ -68,9 +68,9 @@ std::vector<double> currents_of(const Period& period) {
 }
 
 std::vector<double> currents_of(const std::string& experiment) {
+  const auto rows = experiments::experiment(experiment).value();
   std::vector<double> current_a;
-  for (const experiments::ProfileRow& row : experiments::experiment(experiment).value())
-    current_a.push_back(row.current_a);
+  for (const experiments::ProfileRow& row : rows) current_a.push_back(row.current_a);
   return current_a;
 }
 
