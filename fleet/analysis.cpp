@@ -19,7 +19,7 @@ constexpr std::size_t fewest_neighbours = 3;  ///< cells of a battery whose medi
 constexpr double known_soc = 0.03;            ///< a start with a larger sigma is not used
 constexpr double least_discharge = 0.01;      ///< lost charge that is worth a visit
 constexpr double cause_share = 0.2;           ///< of the recordings that are off, for a cause to be named
-constexpr double most_days = 3'650;
+constexpr double forecast_days = 3'650;
 
 /// What a cause is taken for if all cells of a battery show it.
 const std::map<std::string, std::string>& shared_causes() {
@@ -292,8 +292,8 @@ CellTrends trends_of(const CellHistory& cell, const AnalysisOptions& options) {
   trends.resistance = trend_of(resistance);
   trends.capacity = trend_of(capacity);
   if (trends.resistance)
-    trends.resistance_crossing = crossing_of(*trends.resistance, options.resistance_limit, most_days);
-  if (trends.capacity) trends.capacity_crossing = crossing_of(*trends.capacity, options.capacity_limit, most_days);
+    trends.resistance_crossing = crossing_of(*trends.resistance, options.resistance_limit, forecast_days);
+  if (trends.capacity) trends.capacity_crossing = crossing_of(*trends.capacity, options.capacity_limit, forecast_days);
   return trends;
 }
 

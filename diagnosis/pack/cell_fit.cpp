@@ -112,8 +112,9 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[delay] = -late.slope_v_per_s;
     row[temperature] = warmer_k * all_v;
     double shape_v = 0;
-    for (const Parameter p : {shape_1, shape_2, shape_3}) {
-      row[p] = std::cos(std::numbers::pi * static_cast<double>(p - shape_1 + 1) * (t.soc[then] + dz));
+    for (const Eigen::Index p : std::array<Eigen::Index, 3>{shape_1, shape_2, shape_3}) {
+      const double half_waves = static_cast<double>(p) - static_cast<double>(shape_1) + 1;
+      row[p] = std::cos(std::numbers::pi * half_waves * (t.soc[then] + dz));
       shape_v += theta[p] * row[p];
     }
     const double explained_v = to.ocv_v - from.ocv_v + (to.r0_ohm - from.r0_ohm) * current_a +

@@ -43,8 +43,8 @@ Data data_of(const Matrix& information, const Vector& healthy, const Sensor* add
   }
   if (added != nullptr) {
     Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
-    for (const Parameter p :
-         {charge, capacity, leak, resistance, polarisation, slope, temperature, shape_1, shape_2, shape_3})
+    for (const Eigen::Index p : std::array<Eigen::Index, 10>{charge, capacity, leak, resistance, polarisation, slope,
+                                                             temperature, shape_1, shape_2, shape_3})
       into(p, p) = added->cell ? 1 : 0;
     into(joint, joint) = added->joint ? 1 : 0;
     d.information += into.transpose() * information * into;
