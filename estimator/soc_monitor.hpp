@@ -69,8 +69,7 @@ class SocMonitor {
   }
 
   constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {
-    return bank_.open() || consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v) ||
-           beyond_range(soc) > Soc(0);
+    return bank_.open() || is_suspect(soc, innovation_v);
   }
   /// Square of the overpotential as its error counts.
   constexpr Variance overpotential_v2(const Voltage& above_ocv_v, const State& state) const {
@@ -88,8 +87,7 @@ class SocMonitor {
     if (bank_.open() &&
         correct_from_bank(cell, input, constants, soc, innovation_v, of_resistances_v2, interval, state))
       return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};
-    if (!consistency_.is_suspect() && !OutlierGate<S>::is_suspect(innovation_v) && !(beyond_range(soc) > Soc(0)))
-      return 0;
+    if (!is_suspect(soc, innovation_v)) return 0;
     return judge_deviation(cell, input, soc, innovation_v, of_resistances_v2, interval, state);
   }
 
@@ -100,6 +98,9 @@ class SocMonitor {
   /// By how much a SOC is outside of what a cell can have; else <= 0.
   static constexpr Soc beyond_range(const Soc& soc) {
     return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + capacity_may_be_off));
+  }
+  constexpr bool is_suspect(const Soc& soc, const Voltage& innovation_v) const {
+    return consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v) || beyond_range(soc) > Soc(0);
   }
   /// Flags of an outlier, or of a voltage that shows that the state is inconsistent; else 0.
   template <class Cell>

@@ -40,8 +40,7 @@ struct TemperatureResistance {
     constexpr auto most = static_cast<double>(Factor<FixedPoint>::highest());
     bool fits = true;
     for (const double slow_ratio : {1.0, p[7]}) {
-      const double e = mechanism_detail::energy_over_rt(p[1] * slow_ratio, p[2]);
-      const std::array<double, 4> at = {e * (1 + p[4]), e * (1 + p[5]), e, e * (1 + p[6])};
+      const std::array<double, 4> at = energies(p, p[1] * slow_ratio);
       for (std::size_t k = 0; k < at.size(); ++k)
         fits = fits && at[k] < most && (k == 0 || magnitude(at[k] - at[k - 1]) < most);
     }
@@ -87,12 +86,15 @@ struct TemperatureResistance {
 
    private:
     static constexpr std::array<double, 4> nodes = {0.10, 0.25, 0.50, 0.80};
-    template <class Real>
-    static constexpr std::array<Real, 4> energies(const std::array<Real, 8>& p, const Real& energy_j_per_mol) {
-      const Real e = mechanism_detail::energy_over_rt(energy_j_per_mol, p[2]);
-      return {Real(e * (Real(1) + p[4])), Real(e * (Real(1) + p[5])), e, Real(e * (Real(1) + p[6]))};
-    }
   };
+
+ private:
+  /// Energies at the nodes, over R T_ref.
+  template <class Parameters, class Real>
+  static constexpr std::array<Real, 4> energies(const Parameters& p, const Real& energy_j_per_mol) {
+    const Real e = mechanism_detail::energy_over_rt(energy_j_per_mol, p[2]);
+    return {Real(e * (Real(1) + p[4])), Real(e * (Real(1) + p[5])), e, Real(e * (Real(1) + p[6]))};
+  }
 };
 
 }  // namespace bms::model
