@@ -160,7 +160,8 @@ struct Sha256::Context {
   Context& operator=(const Context&) = delete;
 };
 
-Sha256::Sha256() : context_(std::make_shared<Context>()) {}
+Sha256::Sha256() : context_(std::make_unique<Context>()) {}
+Sha256::~Sha256() = default;
 
 void Sha256::add(std::string_view piece) { EVP_DigestUpdate(context_->of, piece.data(), piece.size()); }
 

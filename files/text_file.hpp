@@ -32,12 +32,15 @@ void write_file(const std::filesystem::path& path, const std::function<void(cons
 class Sha256 {
  public:
   Sha256();
+  ~Sha256();
+  Sha256(const Sha256&) = delete;
+  Sha256& operator=(const Sha256&) = delete;
   void add(std::string_view piece);
   std::string hex();  ///< of all pieces, in lower case; ends the calculation
 
  private:
   struct Context;
-  std::shared_ptr<Context> context_;
+  std::unique_ptr<Context> context_;
 };
 
 /// SHA-256 in lower-case hexadecimal.
