@@ -59,9 +59,9 @@ class StepConstants {
     error_decay_ = Model::error_decay(noise, duration_s_);
   }
 
-  /// Outside of the temperatures of the identification the overpotential is less certain. In the cold, resistances are
-  /// also larger than a cell file says that does not follow the temperature: the filter adds that increase
-  /// (model::assumed_activation_j_per_mol).
+  /// Outside of the temperatures of the identification the overpotential is less certain. Resistances are also larger
+  /// in the cold, and smaller in the warm, than a cell file says that does not follow the temperature: the filter adds
+  /// that difference (model::assumed_activation_j_per_mol).
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     resistance_error_ = Coupling(cell.noise.resistance_error);
@@ -69,11 +69,11 @@ class StepConstants {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
       if (laws_of(cell).resistances_follow_temperature())
         resistance_error_ = Coupling(resistance_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
-      else if (cdegc < cell.reference.cdegc)
-        resistance_error_ =
-            Coupling(resistance_error_ + Coupling(model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt,
-                                                                                        cell.reference.c, c) -
-                                                  Factor(1)));
+      else if (cdegc != cell.reference.cdegc)
+        resistance_error_ = Coupling(
+            resistance_error_ + arithmetic::magnitude(Coupling(model::mechanism_detail::arrhenius<S>(
+                                                                   cell.reference.energy_over_rt, cell.reference.c, c) -
+                                                               Factor(1))));
     }
     update_resistance_noise();
   }

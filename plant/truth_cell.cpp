@@ -43,6 +43,20 @@ CircuitCurves table9_circuit() {
   };
 }
 
+TemperatureFactors lfp_in_the_cold() {
+  constexpr std::array temperature_c = {-30, -20, -10, 0, 10, 20, 25, 35, 45};
+  constexpr std::array r0 = {16.5, 7.22, 3.59, 2.08, 1.40, 1.09, 1.0, 0.890, 0.832};
+  constexpr std::array r1 = {14.0, 7.97, 4.73, 2.91, 1.86, 1.22, 1.0, 0.685, 0.480};
+  constexpr std::array c1 = {0.267, 0.354, 0.460, 0.586, 0.733, 0.905, 1.0, 1.208, 1.443};
+  const auto curve = [&](const std::array<double, temperature_c.size()>& factors) {
+    std::vector<Point> points;
+    for (std::size_t k = 0; k < factors.size(); ++k)
+      points.push_back({static_cast<double>(temperature_c[k]), factors[k]});
+    return MonotoneCurve(std::move(points));
+  };
+  return {.r0 = curve(r0), .r1 = curve(r1), .c1 = curve(c1)};
+}
+
 Cell::Cell(CellParameters parameters, CellState start)
     : parameters_(std::move(parameters)), start_soc_(start.soc), dynamic_{start.v_rc_v, start.temperature_c} {}
 
@@ -50,13 +64,24 @@ double Cell::soc_at(double more_as) const {
   return start_soc_ + (charge_as_ + (more_as - lost_as_)) / (3'600 * parameters_.capacity_ah);
 }
 
-Cell::DynamicState Cell::rates(const DynamicState& at, double soc, double current_a, double ambient_c) const {
+Cell::Circuit Cell::circuit_at(double soc, double temperature_c) const {
   const CircuitCurves& circuit = parameters_.circuit;
-  const double through_r1_a = at.v_rc_v / circuit.r1_ohm.at(soc);
-  const double heat_w = current_a * current_a * circuit.r0_ohm.at(soc) + at.v_rc_v * through_r1_a;
+  Circuit at{circuit.r0_ohm.at(soc), circuit.r1_ohm.at(soc), circuit.c1_f.at(soc)};
+  if (const auto& factors = parameters_.over_temperature) {
+    at.r0_ohm *= factors->r0.at(temperature_c);
+    at.r1_ohm *= factors->r1.at(temperature_c);
+    at.c1_f *= factors->c1.at(temperature_c);
+  }
+  return at;
+}
+
+Cell::DynamicState Cell::rates(const DynamicState& at, double soc, double current_a, double ambient_c) const {
+  const Circuit circuit = circuit_at(soc, at.temperature_c);
+  const double through_r1_a = at.v_rc_v / circuit.r1_ohm;
+  const double heat_w = current_a * current_a * circuit.r0_ohm + at.v_rc_v * through_r1_a;
   const Thermal& thermal = parameters_.thermal;
   return {
-      .v_rc_v = (current_a - through_r1_a) / circuit.c1_f.at(soc),
+      .v_rc_v = (current_a - through_r1_a) / circuit.c1_f,
       .temperature_c =
           (heat_w - thermal.to_ambient_w_per_k * (at.temperature_c - ambient_c)) / thermal.heat_capacity_j_per_k,
   };
@@ -85,7 +110,7 @@ void Cell::run(double current_a, double ambient_c, double duration_s) {
 }
 
 double Cell::voltage_v() const {
-  return parameters_.ocv_v.at(soc()) + dynamic_.v_rc_v + parameters_.circuit.r0_ohm.at(soc()) * current_a_;
+  return parameters_.ocv_v.at(soc()) + dynamic_.v_rc_v + circuit_at(soc(), temperature_c()).r0_ohm * current_a_;
 }
 
 }  // namespace bms::plant

@@ -3,12 +3,15 @@
 //   OCV      smooth in SOC along Table 9 of the paper, with rounded corners
 //   circuit  d v_rc / dt = I / C1 - v_rc / (R1 C1),  V = OCV + v_rc + R0 I,  R0, R1, C1 smooth in SOC
 //   thermal  one node: C dT/dt = heat - G (T - ambient)
+//   cold     R0, R1 and C1 times factors that follow the temperature, if the cell is given them
 //
 // The differential equations are integrated by Runge-Kutta 4 in steps of at most step_s, with the parameters at the
 // momentary SOC; charge is counted by compensated summation. Currents > 0 charge. Nothing here comes from model/ or
 // estimator/, so that an error there cannot be repeated here. It uses no libm: with -ffp-contract=off the bits are the
 // same on every machine.
 #pragma once
+
+#include <optional>
 
 #include "plant/monotone_curve.hpp"
 
@@ -27,6 +30,15 @@ struct CircuitCurves {
 };
 CircuitCurves table9_circuit();
 
+/// Factors of the circuit over temperature [degrees C], 1 at 25.
+struct TemperatureFactors {
+  MonotoneCurve r0, r1, c1;
+};
+/// Of an LFP cell between -30 and 45 degrees C. Not from the paper, whose cell was measured at one temperature: steps
+/// of current at eight temperatures gave R0 a constant part of 7.4 and a part of 2.4 mOhm with 0.473 eV; R1 has 0.3 eV,
+/// and the time constant rises by the root of that. Tables, since the plant has no libm.
+TemperatureFactors lfp_in_the_cold();
+
 /// Not from the paper: a cell of 140 g at 1 J/(gK) between neighbours with little air; time constant 24 min.
 struct Thermal {
   double heat_capacity_j_per_k = 140;
@@ -38,6 +50,7 @@ struct CellParameters {
   MonotoneCurve ocv_v = table9_ocv_v();
   CircuitCurves circuit = table9_circuit();
   Thermal thermal = {};
+  std::optional<TemperatureFactors> over_temperature = {};  ///< without: the same at every temperature
   double step_s = 0.05;
 };
 
@@ -68,6 +81,10 @@ class Cell {
   };
   double soc_at(double more_as) const;
   DynamicState rates(const DynamicState& at, double soc, double current_a, double ambient_c) const;
+  struct Circuit {
+    double r0_ohm, r1_ohm, c1_f;
+  };
+  Circuit circuit_at(double soc, double temperature_c) const;
 
   CellParameters parameters_;
   double start_soc_;

@@ -20,5 +20,16 @@ TEST(Duty, AThousandHoursDriftNowhere) { expect_no_drift(duty_as_in_the_file());
 
 TEST(Duty, AThousandHoursWithErrorsAsStates) { expect_no_drift(duty_with_errors()); }
 
+/// A year in 240 hours, -30 to 45 degrees C: two seeds, since the sensors' drift decides how wrong an hour gets.
+TEST(Duty, FromColdStoreToSummer) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    const DutyFigures f = duty_over_a_year(seed, 240);
+    EXPECT_TRUE(f.finite);
+    EXPECT_LT(f.rmse, 0.025) << seed;
+    EXPECT_LT(f.largest, 0.12) << seed;
+    EXPECT_GT(f.inside, 0.9) << seed;
+  }
+}
+
 }  // namespace
 }  // namespace bms::estimator

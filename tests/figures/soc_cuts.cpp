@@ -17,6 +17,7 @@
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
 #include "host_sim/cuts.hpp"
+#include "measurement/recording.hpp"
 
 namespace bms {
 namespace {
@@ -27,6 +28,7 @@ const std::filesystem::path source = BMS_SOURCE_DIR, data = BMS_DATA_DIR;
 struct Case {
   std::filesystem::path recording;
   std::string cell;
+  bool ends_empty = false;  ///< with a rest, which is a second reference
 };
 
 /// From cold to hot; then those of 25 degrees C that no cell file was identified from.
@@ -34,7 +36,8 @@ std::vector<Case> cases() {
   std::vector<Case> all;
   for (const char* name : {"dyn10_N15_A002", "dyn10_N05_A002", "dyn10_P05_A002", "dyn10_P15_A002", "dyn20_P25_A002",
                            "dyn10_P45_A002", "udds_P25_A002", "fsae_P25_A004", "hwycol_P25_A004"})
-    all.push_back({data / "a123_26650" / (std::string(name) + ".csv"), "a123_26650_extended"});
+    all.push_back({data / "a123_26650" / (std::string(name) + ".csv"), "a123_26650_extended",
+                   std::string_view(name).ends_with("A004")});
   for (const char* name : {"dyn30_N05", "dyn45_P05", "dyn50_P25"})
     all.push_back({data / "a123_esctoolbox" / (std::string(name) + ".csv"), "a123_esctoolbox_extended"});
   all.push_back({source / "recordings/forklift_shift.csv", "table9"});
@@ -49,6 +52,24 @@ bool chosen(const Case& c, const std::vector<std::string>& names) {
   return false;
 }
 
+/// The SOC at which a slow discharge had this voltage.
+double soc_on(const measurement::Recording& slow_discharge, double voltage_v) {
+  std::size_t row = 0;
+  while (row + 1 < slow_discharge.rows() && slow_discharge.voltage_v[row] > voltage_v) ++row;
+  return slow_discharge.soc_ref[row];
+}
+
+/// The reference of `fsae` and `hwycol` takes a capacity of 2.55 Ah for another specimen than that of the other
+/// recordings (README of the recordings). Both end with an hour of rest near empty, where the OCV is steep: the slow
+/// discharge has that voltage at another SOC. This scales the charge that was counted, so that it ends there.
+measurement::Recording ending_at_its_last_rest(measurement::Recording r) {
+  const double end = soc_on(files::read_recording((data / "a123_26650/ocv_P25_dis.csv").string()), r.voltage_v.back()),
+               scale = (1 - end) / (1 - r.soc_ref.back());
+  for (double& soc : r.soc_ref.edit()) soc = 1 - scale * (1 - soc);
+  r.path = std::filesystem::path(r.path).replace_extension().string() + " (last rest).csv";
+  return r;
+}
+
 struct Options {
   bool write = false;
   std::string cell;
@@ -61,9 +82,11 @@ int run(const Options& options) {
   if (!options.write) fmt::print("{}", table);
   for (const Case& c : cases()) {
     if (!std::filesystem::exists(c.recording) || !chosen(c, options.names)) continue;
-    const std::string cell = options.cell.empty() ? c.cell : options.cell;
-    results.push_back(host_sim::run_cuts(files::read_cell(cell), files::read_recording(c.recording.string()), cuts));
-    const std::string rows = host_sim::cut_rows(results.back());
+    const files::CellFile cell = files::read_cell(options.cell.empty() ? c.cell : options.cell);
+    const measurement::Recording recording = files::read_recording(c.recording.string());
+    results.push_back(host_sim::run_cuts(cell, recording, cuts));
+    std::string rows = host_sim::cut_rows(results.back());
+    if (c.ends_empty) rows += host_sim::cut_rows(host_sim::run_cuts(cell, ending_at_its_last_rest(recording), cuts));
     table += rows;
     if (!options.write) fmt::print("{}", rows);
     std::fflush(stdout);

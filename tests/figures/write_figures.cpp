@@ -114,6 +114,8 @@ std::string thousand_hours() {
   };
   row("as in the cell file: 20 mA over an hour, 0.5 mV over ten", duty_as_in_the_file());
   row("errors as states, 30 mA and 2 mV over ten hours", duty_with_errors());
+  row("the same, -30 to 45 °C by season, resistances identified at four temperatures", duty_over_a_year());
+  row("-30 to 45 °C by season, cell file without temperature", duty_as_in_the_file(seasons));
   return table;
 }
 

@@ -144,6 +144,19 @@ TEST(TruthCell, WarmsToItsSteadyStateAndThenCoolsExponentially) {
   EXPECT_NEAR(cell.temperature_c(), ambient_c + warm_k * std::exp(-1.0), 1e-9);
 }
 
+TEST(TruthCell, HasSixteenTimesTheResistanceInTheCold) {
+  CellParameters p;
+  p.over_temperature = lfp_in_the_cold();
+  const auto drop_v = [&](double celsius) {
+    Cell cell(p, {.soc = 0.5, .v_rc_v = 0, .temperature_c = celsius});
+    const double rest_v = cell.voltage_v();
+    cell.run(-1, celsius, 0.01);
+    return rest_v - cell.voltage_v();
+  };
+  EXPECT_NEAR(drop_v(-30) / drop_v(25), 16.5, 0.05);
+  EXPECT_NEAR(drop_v(45) / drop_v(25), 0.832, 0.002);
+}
+
 TEST(Random, IsNormalInItsFirstFourMoments) {
   Random random(3);
   constexpr int count = 200'000;
