@@ -40,14 +40,15 @@ TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
   EXPECT_EQ(c.unknown_charge(cell, 6.0), 1) << "not more than the capacity";
 }
 
-TEST(StepConstants, TheColdMakesResistancesUncertainAndTheHeatDoesNot) {
+TEST(StepConstants, ColdAndHeatMakeResistancesUncertainThatFollowNoTemperature) {
   const auto cell = tests::prepared<double>();
   Constants<double> c;
   c.set_time_step(cell.noise, 1'000'000);
   c.set_temperature(cell, 2'500);
   EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
   c.set_temperature(cell, 4'500);
-  EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
+  const double less = 1 - std::exp(40'000 / 8.314462618 * (1 / 318.15 - 1 / 298.15));
+  EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + less, 1e-6);
   c.set_temperature(cell, -500);
   const double more = std::exp(40'000 / 8.314462618 * (1 / 268.15 - 1 / 298.15)) - 1;
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + more, 1e-6);
