@@ -2,8 +2,10 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <type_traits>
 
 #include "estimator/ambiguous_soc.hpp"
 #include "estimator/cell_state.hpp"
@@ -29,7 +31,6 @@ class FirstState {
   using Soc = arithmetic::Soc<S>;
   using Voltage = arithmetic::Voltage<S>;
   using Current = arithmetic::Current<S>;
-  using Temperature = arithmetic::Temperature<S>;
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
   using Variances = typename Model::Variances;
@@ -46,94 +47,158 @@ class FirstState {
     SocDistribution<S> soc{Soc(0.5), Variance{}};
     if (from != nullptr) soc = given(*from);
     const auto tables = operating_point(cell, input);
-    const At at = look_up(tables, soc.soc, interval_);
-    const StartPolarisation<S> rc = start_polarisation<S>(at, input.current_a, cell.noise);
-    Reading reading{};
-    reading.of_states[0] = Variance(cell.noise.v_rc_v2 + rc.variance_v2);
-    Model::start(laws_of(cell), state_.model_state, reading.of_states, at, input, cell.noise);
-    const Variances variances = with_polarisation_before(cell, input, soc.soc, reading);
+    const Reading<Cell> reading = reading_of(cell, input, current_measured, look_up(tables, soc.soc, interval_));
     // a start that is finer than the points of the grid needs no help from a voltage
     if (from == nullptr || soc_of_ppb(from->soc_sigma_ppb) > Soc(2.0 / start_points)) {
-      reading.v2 = Variance(cell.noise.rest_v2 + rc.variance_v2);
-      if (!current_measured) {
-        const Voltage unknown_v = at.r0_ohm * cell.noise.unknown_a;
-        reading.v2 = Variance(reading.v2 + unknown_v * unknown_v);
-      }
-      reading.above_v2 = Variance(Variance(reading.v2 - rc.before_v2) + rc.charged_before_v2);
-      if (voltage_uv != nullptr) {
-        const Voltage load_v = rc.v_rc_v + Model::sum_v(state_.model_state) + at.r0_ohm * input.current_a;
-        reading.ocv_v = Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) - load_v;
-        reading.present = true;
-      }
-      soc = read(cell, tables, input, from != nullptr, soc, reading);
+      const bool present = voltage_uv != nullptr;
+      const Voltage read_v =
+          present ? Model::true_voltage(laws_of(cell), arithmetic::from_micro<Voltage>(*voltage_uv)) : Voltage(0);
+      Load load;
+      const auto of_ocv = [&](const At& there) {
+        if (!load.is_that_of(there)) load = reading.load(there);
+        return OcvReading<S>{read_v - Voltage(load.left_v + there.r0_ohm * input.current_a), load.v2, load.above_v2};
+      };
+      soc = from_voltage(tables, from != nullptr, soc, present ? &of_ocv : nullptr);
     }
+    const At there = look_up(tables, soc.soc, interval_);
+    const StartState left = reading.start_state(there);
     state_.charge.set(soc.soc, cell.charge);
-    state_.model_state[0] = rc.v_rc_v;
-    Variances all = variances;
+    state_.model_state = left.state;
+    Variances all = left.variances(laws_of(cell), reading.own_v2);
     all[Model::soc] = soc.variance;
     state_.covariance.set_diagonal(all);
-    return look_up(tables, soc.soc, interval_);
+    return there;
   }
 
  private:
-  /// The first voltage, as a reading of the OCV.
-  struct Reading {
-    bool present = false;
-    Voltage ocv_v{};
-    Variance v2{}, above_v2{};       ///< of the reading; of one above the curve
-    Variances of_states{}, above{};  ///< of the states, in the same way
+  using FinalVoltages = std::array<Voltage, 1 + Model::soc - Model::first_voltage>;
+
+  /// What the present current, flowing for an unknown time, and an unknown current before may have left: half of the
+  /// final voltages of one, with all of those of the other as standard deviation.
+  struct StartState {
+    typename Model::State state;
+    FinalVoltages before_v;
+
+    /// own_v2: variances of the states without any current.
+    template <class Laws>
+    constexpr Variances variances(const Laws& laws, Variances own_v2) const {
+      const auto add = [](Variance& to, const Voltage& half_v, const Voltage& before) {
+        to = Variance(Variance(to + half_v * half_v) + before * before);
+      };
+      add(own_v2[0], state[0], before_v[0]);
+      for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) {
+        if (Model::is_polarisation(laws, k))
+          add(own_v2[k], state[Model::value_index(k)], before_v[1 + k - Model::first_voltage]);
+      }
+      return own_v2;
+    }
   };
+
+  /// What is between the first voltage and the OCV, at the resistances of one SOC.
+  struct Load {
+    At at{};
+    Voltage left_v{};           ///< of polarisations
+    Variance v2{}, above_v2{};  ///< as in OcvReading
+
+    /// Within an eighth: this is an uncertainty, and costs as much as the rest of a start.
+    constexpr bool is_that_of(const At& there) const {
+      const auto close = [](const auto& a, const auto& b) {
+        using T = std::remove_cvref_t<decltype(a)>;
+        return arithmetic::magnitude(T(a - b)) <= T(b * Fraction(0.125));
+      };
+      return close(there.r1_ohm, at.r1_ohm) && close(there.activation, at.activation) && close(there.gap, at.gap);
+    }
+  };
+
+  /// The first voltage as a reading of the OCV. Resistances depend on the SOC, in the cold by a factor of ten: so do
+  /// the polarisation and its uncertainty.
+  template <class Cell>
+  struct Reading {
+    const Cell& cell;
+    StepInput input;
+    typename Model::State state;  ///< at `final_v`
+    FinalVoltages final_v, charged_v;
+    Variances own_v2;
+    bool warm;
+    Variance rest_v2;
+    Current unknown_a;  ///< through R0
+
+    constexpr FinalVoltages final_at(const At& there) const {
+      const StepInput unknown{cell.noise.unknown_a, input.duration_s, input.temperature_c};
+      return Model::final_voltages(laws_of(cell), state, there, unknown);
+    }
+    constexpr StartState start_state(const At& there) const {
+      const FinalVoltages there_v = final_at(there);
+      return {Model::polarisation_at(state, final_v, there_v), there_v};
+    }
+    constexpr Load load(const At& there) const {
+      const StartState left = start_state(there);
+      const auto h = Model::measurement_jacobian(laws_of(cell), there, input);
+      const Voltage unknown_v = there.r0_ohm * unknown_a;
+      const auto variance = [&](const StartState& p) {
+        Variances of_states = p.variances(laws_of(cell), own_v2);
+        of_states[0] = Variance(of_states[0] - own_v2[0]);  // a rested voltage has an error of its own
+        const Variance of_polarisation =
+            sum_variance<Model>(of_states, h, [](std::size_t k) { return k == 0 || k >= Model::first_voltage; });
+        return Variance(Variance(rest_v2 + unknown_v * unknown_v) + of_polarisation);
+      };
+      return {there, left.state[0] + Model::sum_v(left.state), variance(left),
+              variance(warm ? left : StartState{left.state, charged_v})};
+    }
+  };
+
+  /// In the cold, chargers reduce their current at least as the resistance increases, so a charge leaves no larger
+  /// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full. at: the tables
+  /// at any SOC.
+  template <class Cell>
+  constexpr Reading<Cell> reading_of(const Cell& cell, const StepInput& input, bool current_measured, const At& at) {
+    Variances own_v2{};
+    own_v2[0] = cell.noise.v_rc_v2;
+    Model::start(laws_of(cell), state_.model_state, own_v2, at, input, cell.noise);
+    state_.model_state[0] = at.r1_ohm * Fraction(0.5) * input.current_a;
+    for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) {
+      const Voltage& half_v = state_.model_state[Model::value_index(k)];
+      if (Model::is_polarisation(laws_of(cell), k)) own_v2[k] = Variance(own_v2[k] - half_v * half_v);
+    }
+    const bool warm = input.temperature_c > cell.reference.c || !rests<S>(input.current_a, cell.noise);
+    Reading<Cell> reading{cell,
+                          input,
+                          state_.model_state,
+                          {},
+                          {},
+                          own_v2,
+                          warm,
+                          cell.noise.rest_v2,
+                          current_measured ? Current(0) : cell.noise.unknown_a};
+    reading.final_v = reading.final_at(at);
+    if (!warm) reading.charged_v = charged_before(cell, input);
+    return reading;
+  }
+  /// Final voltages of the unknown current at the reference temperature.
+  template <class Cell>
+  constexpr FinalVoltages charged_before(const Cell& cell, const StepInput& input) const {
+    const StepInput charge{cell.noise.unknown_a, input.duration_s, cell.reference.c};
+    std::uint8_t interval = 0;
+    return Model::final_voltages(laws_of(cell), state_.model_state,
+                                 look_up(operating_point(cell, charge), Soc(0.5), interval), charge);
+  }
 
   template <class Cell>
   constexpr auto operating_point(const Cell& cell, const StepInput& input) const {
     return model::OperatingPoint{cell, input, Model::mechanism_states(state_.model_state)};
   }
 
-  template <class Cell, class Tables>
-  constexpr SocDistribution<S> read(const Cell& cell, const Tables& tables, const StepInput& input, bool given_before,
-                                    const SocDistribution<S>& before, const Reading& reading) {
-    const auto of_mechanisms_v2 = [&](const At& there, bool above) {
-      return sum_variance<Model>(above ? reading.above : reading.of_states,
-                                 Model::measurement_jacobian(laws_of(cell), there, input),
-                                 [](std::size_t k) { return k >= Model::first_voltage; });
-    };
-    StartMisfit<S, Tables, decltype(of_mechanisms_v2)> misfit{
-        tables,           reading.present ? &reading.ocv_v : nullptr, reading.v2,
-        reading.above_v2, given_before ? &before : nullptr,           of_mechanisms_v2};
-    const SocDistribution<S> soc = reading.present ? soc_from(misfit) : before;
+  /// reading: nullptr if it is missing.
+  template <class Tables, class OfOcv>
+  constexpr SocDistribution<S> from_voltage(const Tables& tables, bool given_before, const SocDistribution<S>& before,
+                                            const OfOcv* reading) {
+    StartMisfit<S, Tables, OfOcv> misfit{tables, reading, given_before ? &before : nullptr};
+    const SocDistribution<S> soc = reading != nullptr ? soc_from(misfit) : before;
     const bool ambiguous = soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma);
     if (!ambiguous && !given_before) return soc;
-    state_.covariance.set_diagonal(reading.of_states);  // the bank needs the variances of the other states
     misfit.wrong = WrongPrior::even_odds;
     ambiguous_.open_at(soc.soc, misfit, !ambiguous);
     return soc;
-  }
-
-  /// Adds what an unknown current before may have left in the mechanisms' polarisations. For a reading above the curve:
-  /// in the cold, chargers reduce their current as the resistance increases (start_polarisation). Returns the variances
-  /// of the states.
-  template <class Cell>
-  constexpr Variances with_polarisation_before(const Cell& cell, const StepInput& input, const Soc& soc,
-                                               Reading& reading) const {
-    reading.above = reading.of_states;
-    if constexpr (Model::first_voltage < Model::soc) {
-      const auto& laws = laws_of(cell);
-      const bool warm = input.temperature_c > cell.reference.c || !rests<S>(input.current_a, cell.noise);
-      const auto left_v = [&](const Temperature& c) {
-        const StepInput unknown{cell.noise.unknown_a, input.duration_s, c};
-        std::uint8_t interval = 0;
-        return Model::final_voltages(laws, state_.model_state, look_up(operating_point(cell, unknown), soc, interval),
-                                     unknown);
-      };
-      const auto below_v = left_v(input.temperature_c), above_v = left_v(warm ? input.temperature_c : cell.reference.c);
-      for (std::size_t k = 0; Model::first_voltage + k < Model::soc; ++k) {
-        if (!Model::is_polarisation(laws, Model::first_voltage + k)) continue;
-        Variance &b = reading.of_states[Model::first_voltage + k], &a = reading.above[Model::first_voltage + k];
-        b = Variance(b + below_v[1 + k] * below_v[1 + k]);
-        a = Variance(a + above_v[1 + k] * above_v[1 + k]);
-      }
-    }
-    return reading.of_states;
   }
 
   static constexpr SocDistribution<S> given(const measurement::StartingPoint& from) {

@@ -287,7 +287,7 @@ class SocEstimator {
     errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
     monitor_.start(cell);
-    monitor_.bank().open_at(soc.soc, StartMisfit<S, Cell>{cell, nullptr, Variance{}, Variance{}, &soc});
+    monitor_.bank().open_at(soc.soc, StartMisfit<S, Cell>{cell, nullptr, &soc});
     return estimate;
   }
 

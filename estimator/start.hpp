@@ -1,8 +1,10 @@
 // The first state of charge, from a rested voltage, with the uncertainty that it leaves.
 //
-// The voltage, minus half of the voltage that the present current may have built up in the RC branch, is a reading of
-// the OCV curve with a standard deviation. Every SOC from 0 to 1 is weighted by how well its OCV fits; the start is the
-// mean and standard deviation of this distribution. On the plateau that is a wide band, as it should be.
+// Nobody knows how long the present current has flowed, and what flowed before (noise.current_unknown_a). The voltage,
+// minus half of the voltage that the present current may have built up in the RC branch, is a reading of
+// the OCV curve with a standard deviation. Both follow the resistances at each SOC. Every SOC from 0 to 1 is weighted
+// by how well its OCV fits; the start is the mean and standard deviation of this distribution. On the plateau that is a
+// wide band, as it should be.
 //
 // Cost: two passes over 256 points, once.
 #pragma once
@@ -22,39 +24,12 @@ struct SocDistribution {
   arithmetic::Variance<S> variance;
 };
 
-/// Voltage of the RC branch at the start.
-template <class S>
-struct StartPolarisation {
-  arithmetic::Voltage<S> v_rc_v;
-  arithmetic::Variance<S> variance_v2;
-  arithmetic::Variance<S> before_v2{};          ///< part of variance_v2 that is from the current before
-  arithmetic::Variance<S> charged_before_v2{};  ///< that part if the current before charged the cell
-};
-
 inline constexpr double rests_below_c = 0.01;  ///< current of a cell at rest, in capacities per hour
 
 template <class S>
 constexpr bool rests(const arithmetic::Current<S>& current_a, const model::FilterNoise<S>& noise) {
   return arithmetic::magnitude(current_a) <
          arithmetic::Current<S>(noise.one_c_a * arithmetic::Fraction<S>(rests_below_c));
-}
-
-/// Nobody knows how long the present current has flowed. The RC branch is assumed to be charged to half of its final
-/// voltage, with a standard deviation of the same size; the current before that adds to it (noise.current_unknown_a).
-/// In the cold, chargers reduce their current at least as the resistance increases, so a charge leaves no larger
-/// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full.
-template <class S>
-constexpr StartPolarisation<S> start_polarisation(const model::TablePoint<S>& at,
-                                                  const arithmetic::Current<S>& current_a,
-                                                  const model::FilterNoise<S>& noise) {
-  using namespace model;
-  const Voltage<S> half_v = at.r1_ohm * Fraction<S>(0.5) * current_a;
-  const Voltage<S> before_v = at.r1_ohm * noise.unknown_a;
-  const auto charged_v = rests<S>(current_a, noise) && at.activation > Factor<S>(1)
-                             ? ratio<Voltage<S>>(before_v, Voltage<S>(at.activation))
-                             : before_v;
-  const Variance<S> before_v2 = before_v * before_v;
-  return {half_v, Variance<S>(half_v * half_v) + before_v2, before_v2, charged_v * charged_v};
 }
 
 inline constexpr int start_points = 256;
@@ -83,25 +58,28 @@ constexpr const auto& noise_of(const Cell& cell) {
     return cell.noise;
 }
 
-/// Variance of a reading that depends on the SOC: none.
-struct NoMoreVariance {
+/// The first voltage less what the present current explains, as a reading of the OCV.
+template <class S>
+struct OcvReading {
+  arithmetic::Voltage<S> ocv_v{};
+  arithmetic::Variance<S> v2{};        ///< of the reading
+  arithmetic::Variance<S> above_v2{};  ///< the same for a reading above the curve
+
+  /// The same at every SOC.
   template <class At>
-  constexpr auto operator()(const At& at, bool) const {
-    return decltype(at.error_v2){};
+  constexpr const OcvReading& operator()(const At&) const {
+    return *this;
   }
 };
 
-/// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0. More: variance of the reading that depends on
-/// the SOC, from the tables there and whether the reading is above the curve.
-template <class S, class Cell, class More = NoMoreVariance>
+/// Misfit of a SOC to a reading of the OCV, to a prior, or to both; >= 0. Reading: the OcvReading from the tables at a
+/// SOC, since the resistances there decide on what a current left.
+template <class S, class Cell, class Reading = OcvReading<S>>
 struct StartMisfit {
   const Cell& cell;
-  const arithmetic::Voltage<S>* ocv_v;  ///< the reading; nullptr if it is missing
-  arithmetic::Variance<S> variance_v2;  ///< of the reading
-  arithmetic::Variance<S> above_v2;     ///< the same for a reading above the curve
+  const Reading* reading;  ///< nullptr if it is missing
   const SocDistribution<S>*
       before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
-  More more_v2{};
   WrongPrior wrong = WrongPrior::one_in_a_hundred;
 
   /// half_step: half the spacing of the points for which this is called.
@@ -109,11 +87,11 @@ struct StartMisfit {
                                                std::uint8_t& interval) const {
     using namespace model;
     Exponent<S> misfit(0);
-    if (ocv_v != nullptr) {
+    if (reading != nullptr) {
       const auto at = look_up(cell, soc, interval);
-      const Voltage<S> off_v = *ocv_v - at.ocv_v;
-      const bool above = off_v > Voltage<S>(0);
-      const Variance<S> one_v2 = Variance<S>(Variance<S>((above ? above_v2 : variance_v2) + more_v2(at, above)) +
+      const OcvReading<S> read = (*reading)(at);
+      const Voltage<S> off_v = read.ocv_v - at.ocv_v;
+      const Variance<S> one_v2 = Variance<S>((off_v > Voltage<S>(0) ? read.above_v2 : read.v2) +
                                              soc_axis_variance<S>(cell, noise_of(cell), at, soc, off_v));
       // half a point's width on the curve counts as uncertainty as well: steep parts have few points
       const Voltage<S> half_width_v = product<Voltage<S>>(ocv_slope<S>(at), half_step);
@@ -129,8 +107,8 @@ struct StartMisfit {
 };
 
 /// Mean and variance of the SOC, weighted by exp(-misfit).
-template <class S, class Cell, class More>
-constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell, More>& misfit_of) {
+template <class S, class Cell, class Reading>
+constexpr SocDistribution<S> soc_from(const StartMisfit<S, Cell, Reading>& misfit_of) {
   using namespace model;
   constexpr int points = start_points;
   const Fraction<S> spacing(1.0 / points), half_step(0.5 / points);

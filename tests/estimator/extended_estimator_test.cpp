@@ -247,6 +247,30 @@ TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
   EXPECT_EQ(h[Model::last], 0);
 }
 
+/// In the cold the resistance near empty is many times that at half charge, and so is what an earlier load left.
+TEST(ExtendedEstimator, AStartInAColdShiftSpansWhatTheLoadLeftAtEachSoc) {
+  std::vector<MechanismSetting> steep{usual("temperature_resistance")};
+  MechanismSetting& m = steep.front();
+  for (std::size_t k = 0; k < catalogue[m.index].parameters; ++k) {
+    const std::string_view name = catalogue[m.index].parameter[k].name;
+    if (name == "r1_activation_j_per_mol") m.value[k] = 35'000;
+    if (name == "more_at_10") m.value[k] = 1.2;
+    if (name == "more_at_25") m.value[k] = 0.8;
+  }
+  const auto laws = chosen<double>(steep, capacity_ah);
+  const auto exact = tests::prepared<double>();
+  OpenLoopSimulation<double> simulation(exact, capacity_ah, laws, 0.3);
+  double v = 0;
+  int k = 0;
+  for (; simulation.soc() > 0.16; ++k) v = simulation.step(k, k == 0 ? 0 : 1, -1.0, -15, [](auto&, const auto&) {});
+  for (int rest = 0; rest < 5; ++rest, ++k) v = simulation.step(k, 1, 0, -15, [](auto&, const auto&) {});
+  ExtendedCell<float, max_intervals, HostLaws<float>> cell{tests::prepared<float>(), chosen<float>(steep, capacity_ah)};
+  SocEstimator<float, ExtendedRc<0, mechanism_state_count>::Of> estimator;
+  const auto e = estimator.step(cell, {1, 0, static_cast<std::int32_t>(std::lround(v * 1e6)), -1'500});
+  EXPECT_LE(std::abs(e.soc - simulation.soc()), 2 * e.soc_sigma) << e.soc << " +- " << e.soc_sigma;
+  EXPECT_LT(e.soc_sigma, 0.25);
+}
+
 TEST(ExtendedEstimator, FindsTheOffsetOfACurrentSensorAtTheKnees) {
   double error = 0, error_without = 0;
   for (const auto& [offset_a, seed] : {std::pair{-0.08, 1U}, {0.08, 1U}, {-0.08, 2U}, {0.08, 2U}}) {

@@ -18,7 +18,8 @@ template <class Cell, class V>
 auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
   using S = typename Cell::Scalar;
   const auto variance_v2 = arithmetic::Variance<S>(sigma_v * sigma_v);
-  return soc_from(StartMisfit<S, Cell>{cell, &ocv_v, variance_v2, variance_v2, nullptr});
+  const OcvReading<S> reading{ocv_v, variance_v2, variance_v2};
+  return soc_from(StartMisfit<S, Cell>{cell, &reading, nullptr});
 }
 
 template <class S>
