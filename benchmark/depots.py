@@ -125,7 +125,8 @@ def cause_rows(planted):
         of = [p for p in planted if p["cause"] == cause]
         others = sorted({other for p in of for other in p["other"]})
         late = " ".join(f"{p['late']:+d}" if p["late"] else "0" for p in of if p["late"] is not None)
-        lines.append(f"| {cause} | {len(of)} | {sum(p['named'] for p in of)} | {', '.join(others) or '-'} | {late or '-'} |")
+        lines.append(f"| {cause} | {len(of)} | {sum(p['named'] for p in of)} | {', '.join(others) or '-'} "
+                     f"| {late or '-'} |")
     return lines
 
 
@@ -150,7 +151,7 @@ def table(o, scores):
              f"{o.hours:g} h, a sample every {o.step:g} s. In brackets: Wilson's 95 % interval.", "",
              "| figure | required | measured |", "|---|---|---|"]
     lines += [f"| {' | '.join(row)} |" for row in rows] + [""] + cause_rows(planted)
-    bad = [f"| depot {p['depot']}, {p['truck']} | {p['cause']} | not named{', but ' + ', '.join(p['other']) if p['other'] else ''} |"
+    bad = [f"| depot {p['depot']}, {p['truck']} | {p['cause']} | not named; {', '.join(p['other']) or 'no visit'} |"
            for p in planted if not p["named"]]
     bad += [f"| depot {w['depot']}, {w['truck']}, {'cell ' + w['cell'] if w['cell'] else 'whole battery'} "
             f"| {w['planted'] or 'nothing'} | {w['cause']} |" for w in wrong]

@@ -118,7 +118,7 @@ def page_row(o, folder):
     with_page = min(browser_s(page, folder) for _ in range(3))
     if o.screenshot:
         browser_s(page, folder, o.screenshot)
-    return (f"page of 24,000 recordings ({page.stat().st_size / 1e6:.1f} MB), in a headless browser above an empty page",
+    return (f"page of 24,000 recordings ({page.stat().st_size / 1e6:.1f} MB), in a headless browser above an empty one",
             "<= 3 s", f"{with_page[0] - without[0]:.1f} s; writing it {writing_s:.1f} s")
 
 
@@ -134,7 +134,8 @@ def main():
         folder = pathlib.Path(own)
         rows = [page_row(o, folder)]
         cpu_ms, wall_ms = overhead_ms(o.tool, folder / "overhead", 200)
-        rows.append(("overhead of a recording next to its task", "<= 20 ms", f"{cpu_ms:.1f} ms (wall {wall_ms:.1f} ms)"))
+        rows.append(("overhead of a recording next to its task", "<= 20 ms",
+                     f"{cpu_ms:.1f} ms (wall {wall_ms:.1f} ms)"))
         write_recordings(folder / "few", 100)
         write_recordings(folder / "many", o.units)
         few, _ = largest_memory_kb(fleet_command(o.tool, folder / "few", folder / "few_out", 2))

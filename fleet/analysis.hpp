@@ -3,10 +3,10 @@
 // Each cell is compared with itself over time and with its neighbours, which share its current sensor:
 //
 //   off         recordings whose diagnosis names a cause or cannot explain a mismatch. A healthy recording is off with
-//   a
-//               known rate; recordings of one cell are alike, so false alarms are more dispersed than by chance
+//               a known rate; recordings of one cell are alike, so false alarms are more dispersed than by chance
 //   shared      more than half of a battery's cells are off on the same day: the cause is what they share
 //   discharged  the charge at the start of a shift falls against that of the neighbours: a self-discharge
+//   weak        the estimates of the capacity are together below those of the neighbours, though none alone is
 //   drifting    the offset of the current sensor, estimated by all cells, begins to change
 //
 // All these hypotheses, of all cells and batteries, share one false discovery rate (Benjamini and Hochberg).
@@ -36,6 +36,7 @@ struct Issue {
   std::vector<std::string> also;  ///< further mechanisms that its recordings name
   std::size_t seen = 0, of = 0;   ///< days or recordings that show it, and those that could
   double p_value = 1, rate = 1;   ///< rate: smallest false discovery rate at which it is accepted
+  bool by_comparison = false;     ///< found against the neighbours, not by the diagnosis of single recordings
   bool confirmed = false;
   std::optional<double> onset_day;
   std::optional<Strength> size;  ///< in the unit of the mechanism's first parameter; of the last recordings

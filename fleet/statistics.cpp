@@ -9,6 +9,9 @@ namespace bms::fleet {
 
 namespace {
 
+constexpr std::size_t fewest_readings = 4;  ///< of a mean or a trend
+constexpr double own_share = 0.5;           ///< of the stated sigmas that is at least not common to all readings
+
 double log_beta(double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); }
 
 double log_choose(double n, double k) { return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1); }
@@ -78,10 +81,23 @@ std::vector<double> false_discovery_rates(const std::vector<double>& p_values, s
   return rates;
 }
 
+std::optional<Mean> mean_of(const std::vector<Reading>& readings) {
+  if (readings.size() < fewest_readings) return std::nullopt;
+  double w = 0, y = 0;
+  for (const Reading& r : readings) {
+    w += 1 / (r.sigma * r.sigma);
+    y += r.value / (r.sigma * r.sigma);
+  }
+  const double mean = y / w;
+  double cost = 0;
+  for (const Reading& r : readings) cost += std::pow((r.value - mean) / r.sigma, 2);
+  const double dispersion = std::max(own_share * own_share, cost / static_cast<double>(readings.size() - 1));
+  return Mean{mean, std::sqrt(dispersion / w)};
+}
+
 std::optional<Trend> trend_of(const std::vector<Reading>& readings) {
-  constexpr std::size_t fewest = 4;
-  constexpr double shortest_days = 3, own_share = 0.5;
-  if (readings.size() < fewest) return std::nullopt;
+  constexpr double shortest_days = 3;
+  if (readings.size() < fewest_readings) return std::nullopt;
   double w = 0, x = 0, y = 0, least_sigma = std::numeric_limits<double>::infinity();
   for (const Reading& r : readings) {
     const double weight = 1 / (r.sigma * r.sigma);

@@ -24,6 +24,13 @@ struct Reading {
   double day = 0, value = 0, sigma = 0;
 };
 
+/// A weighted mean. Its sigma follows from the scatter around it, but is at least what half of the stated sigmas gives.
+struct Mean {
+  double value = 0, sigma = 0;
+};
+/// Nothing for fewer than 4 readings.
+std::optional<Mean> mean_of(const std::vector<Reading>& readings);
+
 /// value = level + per_day (day - middle).
 struct Trend {
   double middle = 0, level = 0, level_sigma = 0;

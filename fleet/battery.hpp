@@ -1,0 +1,17 @@
+// The cells of one battery, compared with themselves over time and with each other.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "fleet/analysis.hpp"
+
+namespace bms::fleet {
+
+/// Hypotheses that are tested of each cell: off in many recordings, discharged, weak. A battery has one of its own.
+inline constexpr std::size_t hypotheses_of_a_cell = 3;
+
+/// Adds what may be wrong with a battery. cells: the places of its cells in `history`.
+void judge_battery(const History& history, std::vector<std::size_t> cells, std::vector<Issue>& issues);
+
+}  // namespace bms::fleet
