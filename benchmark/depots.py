@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Makes synthetic depots with planted faults, runs bms fleet on them and scores what its report says to visit.
 
-  depots.py TOOL MAKE_DEPOT SEED [--depots 5 --trucks 14 --cells 4 --days 20 --hours 1 --step 2] [--folder DIR]
+  depots.py TOOL MAKE_DEPOT SEED [--depots 5 --trucks 14 --cells 4 --days 20 --hours 1 --step 5] [--folder DIR]
 
 TOOL: bms. MAKE_DEPOT: the program that writes a depot. Depot k has the seed 1000 SEED + k. Each has four trucks with a
 planted fault; the others are healthy. What is in --folder is used again, so an interrupted run continues.
@@ -30,13 +30,13 @@ def run(*command):
 
 def options_of():
     p = argparse.ArgumentParser(description="Runs bms fleet on synthetic depots and scores its report")
-    p.add_argument("tool", type=pathlib.Path)
-    p.add_argument("make_depot", type=pathlib.Path)
+    p.add_argument("tool", type=os.path.abspath)
+    p.add_argument("make_depot", type=os.path.abspath)
     p.add_argument("seed", type=int)
     for name, value in (("depots", 5), ("trucks", 14), ("cells", 4), ("days", 20), ("jobs", os.cpu_count())):
         p.add_argument(f"--{name}", type=int, default=value)
     p.add_argument("--hours", type=float, default=1)
-    p.add_argument("--step", type=float, default=2)
+    p.add_argument("--step", type=float, default=5)
     p.add_argument("--folder", type=pathlib.Path)
     p.add_argument("--readme", type=pathlib.Path, help="write the table between '<!-- figures: depot -->' and its end")
     return p.parse_args()

@@ -68,6 +68,16 @@ class Causes {
   std::map<std::string, double> weight_;
 };
 
+/// The cause that the recordings name most often, of those that are off. What only one of several names is no cause
+/// yet.
+void set_causes(const Causes& causes, std::size_t off, Issue& issue) {
+  const double share = cause_share * static_cast<double>(off);
+  const auto named = causes.most(std::max(off > 1 ? 2.0 : 1.0, share));
+  issue.cause = named.empty() ? "unknown" : named.front();
+  issue.also = causes.most(std::max(1.0, share));
+  std::erase(issue.also, issue.cause);
+}
+
 /// Standard deviation from day to day, robust.
 double scatter_of(const std::vector<Reading>& readings) {
   std::vector<double> steps;
@@ -139,12 +149,14 @@ class Battery {
     issue.seen = shared_days_.size();
     if (issue.seen == 0 || cells_.size() < 2) return;
     Causes causes;
+    std::size_t off = 0;
     double most = -1;
     for (const std::size_t c : cells_) {
       for (std::size_t k = 0; k < cell(c).entries.size(); ++k) {
         const Entry& e = cell(c).entries[k];
         if (!e.usable() || !shared_days_.contains(date_of(e))) continue;
         causes.add(e);
+        off += is_off(e) ? 1 : 0;
         for (const Named& n : e.named) {
           if (n.gain <= most) continue;
           most = n.gain;
@@ -155,9 +167,7 @@ class Battery {
     }
     if (most < 0) issue.cell = cells_.front();
     causes.share();
-    const auto ids = causes.most(2);
-    issue.cause = ids.empty() ? "unknown" : ids.front();
-    if (ids.size() > 1) issue.also.assign(ids.begin() + 1, ids.end());
+    set_causes(causes, off, issue);
     issue.p_value = false_alarm_probability(shared_, false_alarm, false_alarm_correlation);
     issue.onset_day = static_cast<double>(days_[first_of_many(shared_)]);
     const std::vector<Reading> readings = offsets();
@@ -196,9 +206,7 @@ class Battery {
     issue.of = off.size();
     issue.seen = static_cast<std::size_t>(std::count(off.begin(), off.end(), true));
     if (issue.seen == 0) return;
-    const auto ids = causes.most(std::max(1.0, cause_share * static_cast<double>(issue.seen)));
-    issue.cause = ids.empty() ? "unknown" : ids.front();
-    if (ids.size() > 1) issue.also.assign(ids.begin() + 1, ids.end());
+    set_causes(causes, issue.seen, issue);
     issue.p_value = false_alarm_probability(off, false_alarm, false_alarm_correlation);
     issue.onset_day = std::floor(days[first_of_many(off)]);
     if (const Named* n = cell(c).entries[issue.entry].find(issue.cause)) {

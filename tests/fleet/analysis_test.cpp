@@ -93,6 +93,23 @@ TEST(DepotAnalysis, ALooseContactIsFoundWithItsCellAndDay) {
   EXPECT_GE(in_time, found - 1);
 }
 
+TEST(DepotAnalysis, WhatOneRecordingOfManyNamesIsNotTheCause) {
+  Depot depot(6);
+  for (std::size_t d = 19; d < days; ++d) {
+    Entry& e = depot.at(7, 0, d);
+    e.named.clear();
+    e.verdict = "UNKNOWN";
+    if (d == 21) depot.name(e, "voltage_gain");
+  }
+  const Analysis analysis = analyse(depot.history(), {});
+  const auto issue = std::find_if(analysis.issues.begin(), analysis.issues.end(),
+                                  [](const Issue& i) { return i.truck == "truck_7" && i.cell_index == "1"; });
+  ASSERT_NE(issue, analysis.issues.end());
+  EXPECT_EQ(issue->seen, 5U);
+  EXPECT_EQ(issue->cause, "unknown");
+  EXPECT_THAT(issue->also, ::testing::ElementsAre("voltage_gain"));
+}
+
 TEST(DepotAnalysis, WhatAllCellsShowIsTheirCommonSensor) {
   Depot depot(1);
   for (std::size_t d = 0; d < days; ++d) {
