@@ -68,8 +68,7 @@ class Causes {
   std::map<std::string, double> weight_;
 };
 
-/// The cause that the recordings name most often, of those that are off. What only one of several names is no cause
-/// yet.
+/// The cause that the recordings name most often, of those that are off. One name among several is not enough.
 void set_causes(const Causes& causes, std::size_t off, Issue& issue) {
   const double share = cause_share * static_cast<double>(off);
   const auto named = causes.most(std::max(off > 1 ? 2.0 : 1.0, share));
