@@ -32,14 +32,22 @@ std::vector<std::string> causes_of(const Issue& issue) {
   return causes;
 }
 
-/// One issue for each cell.
+/// Returns true if a current sensor that drifts explains what the recordings of a single cell name.
+bool is_of_the_sensor(const Issue& issue, const std::vector<Issue>& issues) {
+  if (issue.cell_index.empty() || issue.by_comparison || cause_if_shared(issue.cause) != "current_offset") return false;
+  return std::any_of(issues.begin(), issues.end(), [&](const Issue& other) {
+    return other.confirmed && other.cell_index.empty() && other.truck == issue.truck && other.cause == "current_offset";
+  });
+}
+
+/// One issue for each cell, and one for what its battery shares.
 void join(std::vector<Issue>& issues) {
   std::vector<Issue> joined;
   for (Issue& issue : issues) {
     const auto same = std::find_if(joined.begin(), joined.end(), [&](const Issue& other) {
-      return other.truck == issue.truck && other.cell_index == issue.cell_index && !issue.cell_index.empty();
+      return other.truck == issue.truck && other.cell_index == issue.cell_index;
     });
-    if (same == joined.end() || std::max(rank_of(issue), rank_of(*same)) == 0) {
+    if (same == joined.end() || std::max(rank_of(issue), rank_of(*same)) == 0) {  // nothing that explains the other
       joined.push_back(std::move(issue));
       continue;
     }
@@ -83,12 +91,14 @@ Analysis analyse(const History& history, const AnalysisOptions& options) {
   }
   std::vector<double> p_values;
   for (const Issue& issue : analysis.issues) p_values.push_back(issue.p_value);
-  const std::size_t tests = hypotheses_of_a_cell * history.cells.size() + analysis.trucks;
+  const std::size_t tests = hypotheses_of_a_cell * history.cells.size() + hypotheses_of_a_battery * analysis.trucks;
   const std::vector<double> rates = false_discovery_rates(p_values, tests);
   for (std::size_t k = 0; k < rates.size(); ++k) {
     analysis.issues[k].rate = rates[k];
     analysis.issues[k].confirmed = rates[k] <= options.false_discovery_rate;
   }
+  std::erase_if(analysis.issues,
+                [issues = analysis.issues](const Issue& issue) { return is_of_the_sensor(issue, issues); });
   join(analysis.issues);
   std::stable_sort(analysis.issues.begin(), analysis.issues.end(), [](const Issue& a, const Issue& b) {
     if (a.confirmed != b.confirmed) return a.confirmed;

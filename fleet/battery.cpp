@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <utility>
 
 namespace bms::fleet {
 
@@ -19,17 +20,8 @@ constexpr double known_soc = 0.03;            ///< a start with a larger sigma i
 constexpr double least_discharge = 0.01;      ///< lost charge that is worth a visit
 constexpr double least_loss = 0.03;           ///< of the capacity, against the neighbours, that is worth a visit
 constexpr double capacities_differ = 0.01;    ///< standard deviation of healthy cells of one battery
+constexpr double least_drift = 2;             ///< of the current sensor's offset, in sigmas of one recording's estimate
 constexpr double cause_share = 0.2;           ///< of the recordings that are off, for a cause to be named
-
-/// What a cause is taken for if all cells of a battery show it.
-const std::map<std::string, std::string>& shared_causes() {
-  static const std::map<std::string, std::string> causes = {{"leakage", "current_offset"},
-                                                            {"coulombic_loss", "current_offset"},
-                                                            {"initial_soc", "current_offset"},
-                                                            {"current_offset", "current_offset"},
-                                                            {"current_gain", "current_gain"}};
-  return causes;
-}
 
 long date_of(const Entry& entry) { return std::lround(std::floor(entry.day)); }
 
@@ -46,10 +38,7 @@ class Causes {
   }
   void share() {
     std::map<std::string, double> shared;
-    for (const auto& [id, weight] : weight_) {
-      const auto found = shared_causes().find(id);
-      shared[found == shared_causes().end() ? id : found->second] += weight;
-    }
+    for (const auto& [id, weight] : weight_) shared[cause_if_shared(id)] += weight;
     weight_ = std::move(shared);
   }
   /// Those of at least `least`, the most frequent first.
@@ -96,6 +85,7 @@ class Battery {
     judge_shared(issues);
     for (const std::size_t c : cells_) judge_cell(c, issues);
     if (cells_.size() < fewest_neighbours) return;
+    judge_drift(issues);
     const auto starts = relative_starts();
     std::vector<double> scatters;
     for (const auto& readings : starts) scatters.push_back(scatter_of(readings));
@@ -128,17 +118,50 @@ class Battery {
     }
   }
 
-  /// Offset of the current sensor by day: the median of what the cells estimate.
+  /// Offset of the current sensor by day: the median of what the cells estimate. Around a model that does not fit, an
+  /// estimate says nothing.
   std::vector<Reading> offsets() const {
-    std::map<long, std::vector<double>> by_day;
+    std::map<long, std::pair<std::vector<double>, std::vector<double>>> by_day;
     for (const std::size_t c : cells_) {
       for (const Entry& e : cell(c).entries) {
-        if (e.usable() && e.current_offset) by_day[date_of(e)].push_back(e.current_offset->value);
+        if (!e.usable() || e.verdict == "UNKNOWN" || !e.current_offset) continue;
+        by_day[date_of(e)].first.push_back(e.current_offset->value);
+        by_day[date_of(e)].second.push_back(e.current_offset->sigma);
       }
     }
     std::vector<Reading> readings;
-    for (const auto& [day, values] : by_day) readings.push_back({static_cast<double>(day), median(values), 0});
+    for (const auto& [day, of_cells] : by_day) {
+      if (of_cells.first.size() >= fewest_neighbours)
+        readings.push_back({static_cast<double>(day), median(of_cells.first), median(of_cells.second)});
+    }
     return readings;
+  }
+
+  /// A current sensor whose offset changes from some day on, by more than one recording would show.
+  void judge_drift(std::vector<Issue>& issues) const {
+    std::vector<Reading> readings = offsets();
+    std::vector<double> sigmas;
+    for (Reading& r : readings) sigmas.push_back(std::exchange(r.sigma, 0));
+    const double scatter = scatter_of(readings);
+    const auto onset = onset_of(readings, std::max(scatter, 1e-6));
+    if (!onset) return;
+    const double change = onset->per_day * (readings.back().day - onset->day + 1);
+    if (std::abs(change) < least_drift * median(sigmas)) return;
+    Issue issue;
+    issue.truck = cell(cells_.front()).truck;
+    issue.cause = "current_offset";
+    issue.by_comparison = true;
+    issue.cell = cells_.front();
+    issue.entry = cell(issue.cell).entries.size() - 1;
+    issue.of = readings.size();
+    issue.seen = static_cast<std::size_t>(
+        std::count_if(readings.begin(), readings.end(), [&](const Reading& r) { return r.day >= onset->day; }));
+    issue.p_value = onset->p_value;
+    issue.onset_day = onset->day;
+    issue.per_day = onset->per_day;
+    issue.size = Strength{readings.back().value, scatter};
+    issue.unit = "A";
+    issues.push_back(std::move(issue));
   }
 
   void judge_shared(std::vector<Issue>& issues) {
@@ -169,14 +192,6 @@ class Battery {
     set_causes(causes, off, issue);
     issue.p_value = false_alarm_probability(shared_, false_alarm, false_alarm_correlation);
     issue.onset_day = static_cast<double>(days_[first_of_many(shared_)]);
-    const std::vector<Reading> readings = offsets();
-    const auto onset = onset_of(readings, std::max(scatter_of(readings), 1e-6));
-    if (issue.cause == "current_offset" && onset && onset->p_value < 0.01) {
-      issue.onset_day = onset->day;
-      issue.per_day = onset->per_day;
-      issue.size = Strength{readings.back().value, scatter_of(readings)};
-      issue.unit = "A";
-    }
     issues.push_back(std::move(issue));
   }
 
@@ -318,6 +333,11 @@ class Battery {
 };
 
 }  // namespace
+
+std::string cause_if_shared(const std::string& cause) {
+  const bool like_an_offset = cause == "leakage" || cause == "coulombic_loss" || cause == "initial_soc";
+  return like_an_offset ? "current_offset" : cause;
+}
 
 void judge_battery(const History& history, std::vector<std::size_t> cells, std::vector<Issue>& issues) {
   Battery(history, std::move(cells)).judge(issues);
