@@ -16,6 +16,7 @@
 #include "host_sim/replay.hpp"
 #include "measurement/recording_checks.hpp"
 #include "workflow/diagnosis_comparison.hpp"
+#include "workflow/likeliest_start.hpp"
 
 namespace bms::workflow {
 
@@ -97,11 +98,13 @@ RecordingComparison read(const std::string& path, const files::ReadOptions& read
     start = *reference;
     origin = fmt::format("starts at the first value of soc_ref, {:.1f} %", 100 * start.soc);
   } else if (const auto estimated = estimated_start(r, input.cell)) {
-    start = *estimated;
+    start = likeliest_start(r, input.cell, *estimated);
     origin = fmt::format(
         "starts at the state of charge estimated from the first voltage, {:.0f} % with a standard "
         "deviation of {:.0f} %",
-        100 * start.soc, 100 * start.sigma);
+        100 * estimated->soc, 100 * estimated->sigma);
+    if (start.soc != estimated->soc)
+      origin += fmt::format("; the whole recording fits best from {:.1f} % on", 100 * start.soc);
   }
   if (!origin.empty()) input.warnings.push_back({"initial_soc", path + ": " + origin});
   return prepared(std::move(r), std::filesystem::path(path).filename().string(), input.cell, start);
@@ -111,7 +114,8 @@ RecordingComparison read(const std::string& path, const files::ReadOptions& read
 
 StartSoc start_of(const measurement::Recording& r, const files::CellFile& cell) {
   if (const auto reference = reference_start(r, cell)) return *reference;
-  return estimated_start(r, cell).value_or(StartSoc{});
+  const auto estimated = estimated_start(r, cell);
+  return estimated ? likeliest_start(r, cell, *estimated) : StartSoc{};
 }
 
 measurement::Recording read_for_diagnosis(const std::string& path, const files::ReadOptions& reading,

@@ -18,7 +18,7 @@ struct StartSoc {
 /// A start that is known to the tolerance of the cell file.
 StartSoc given_start(const files::CellFile& cell, double soc);
 
-/// The first value of soc_ref, or else what the estimator concludes from the first voltage.
+/// The first value of soc_ref, or else what the estimator concludes from the first voltage (see likeliest_start()).
 StartSoc start_of(const measurement::Recording& recording, const files::CellFile& cell);
 
 /// A recording as a diagnosis reads it: a logger that writes rows on change gets the rows that it left out.
