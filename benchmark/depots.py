@@ -115,7 +115,7 @@ def share(count, of):
         return "-"
     z, p = 1.96, count / of
     middle, width = p + z * z / (2 * of), z * math.sqrt(p * (1 - p) / of + z * z / (4 * of * of))
-    low, high = ((middle + s * width) / (1 + z * z / of) for s in (-1, 1))
+    low, high = (abs(middle + s * width) / (1 + z * z / of) for s in (-1, 1))
     return f"{count} of {of}: {100 * p:.0f} % ({100 * low:.0f}-{100 * high:.0f})"
 
 
