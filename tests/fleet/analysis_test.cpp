@@ -129,6 +129,22 @@ TEST(DepotAnalysis, WhatAllCellsShowIsTheirCommonSensor) {
   EXPECT_NEAR(issues[0].per_day.value_or(0), 0.01, 0.002);
 }
 
+/// No recording is off: the offset is below what one of them can show, and single cells see their own part of it.
+TEST(DepotAnalysis, ADriftingSensorIsFoundBeforeAnyRecordingNamesIt) {
+  Depot depot(7);
+  for (std::size_t d = 8; d < days; ++d) {
+    for (std::size_t c = 0; c < cells; ++c)
+      depot.at(10, c, d).current_offset->value -= 0.002 * static_cast<double>(d - 7);
+    if (d > 18) depot.name(depot.at(10, 1, d), "leakage");  // the last days of one cell
+  }
+  const auto issues = confirmed(analyse(depot.history(), {}));
+  ASSERT_EQ(issues.size(), 1U);
+  EXPECT_EQ(issues[0].truck + issues[0].cell_index, "truck_10");
+  EXPECT_EQ(issues[0].cause, "current_offset");
+  EXPECT_NEAR(*issues[0].onset_day, 8, 3);
+  EXPECT_NEAR(issues[0].per_day.value_or(0), -0.002, 0.0005);
+}
+
 TEST(DepotAnalysis, ACellThatLosesChargeAgainstItsNeighboursDischargesItself) {
   Depot depot(2);
   for (std::size_t d = 7; d < days; ++d) depot.at(8, 1, d).initial_soc->value -= 0.006 * static_cast<double>(d - 6);
