@@ -142,8 +142,7 @@ class SocMonitor {
     state.covariance.template reset<Model::soc>(before.variance);
     const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_may_be_off)),
                    seen_v2 = consistency_.variance();
-    bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false,
-                  seen_v2 < more_v2 ? seen_v2 : more_v2);
+    bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
   }
 
