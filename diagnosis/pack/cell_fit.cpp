@@ -105,8 +105,8 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     const auto from = model::look_up(t.cell, t.soc[then], here), to = model::look_up(t.cell, t.soc[then] + dz, there);
     const double slope_v = to.ocv_delta_v * to.per_width,
                  by_soc_v = slope_v + to.r0_delta_ohm * to.per_width * current_a;
-    // what the neighbours lose, measured: closer to the truth than the tables
-    const double all_v = late.v - from.ocv_v;
+    // what the neighbours lose; measured, it is closer to the truth than tables that were not compared with the pack
+    const double all_v = t.is_calibrated ? t.r0_by_row_ohm[then] * current_a + t.v_rc_v[then] : late.v - from.ocv_v;
     const double warmer_k = input.warmer_k.empty() || !std::isfinite(input.warmer_k[k]) ? 0 : input.warmer_k[k];
     auto row = out.columns.row(static_cast<Eigen::Index>(k));
     row[charge] = by_soc_v;

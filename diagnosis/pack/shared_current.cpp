@@ -322,11 +322,13 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
   Unknowns wide = p.healthy;
   wide[sensor_offset] = shared.fault_offset_c * track.capacity_ah;
   NoiseModel noise{.white_v = shared.white_v, .fast_v = shared.fast_v, .slow_v = shared.slow_v};
-  Around best = fit_from(p, Unknowns::Zero(), wide, noise);
-  const Around other = fit_from(p, starting_point(p), wide, noise);
-  if (other.cost < best.cost) best = other;
-  noise = noise_of(p, best);
-  best = fit_from(p, best.u, wide, noise);
+  Around best;
+  for (const Unknowns& from : {Unknowns(Unknowns::Zero()), starting_point(p)}) {
+    const Around first = fit_from(p, from, wide, noise);
+    Around found = fit_from(p, first.u, wide, noise_of(p, first));
+    if (found.cost < best.cost) best = std::move(found);
+  }
+  noise = best.noise;
   s.finding = judge(p, best);
   if (!s.finding) best = fit_from(p, best.u, p.healthy, noise);
   s.soc = course_of(p, best.u).soc;

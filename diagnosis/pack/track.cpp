@@ -44,6 +44,7 @@ Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, c
   t.r0_ohm = model::look_up(t.cell, 0.5).r0_ohm;
   t.ocv_tolerance_v = cell.tolerance.ocv_v;
   t.capacity_ah = cell.capacity_ah;
+  t.is_calibrated = !factor.empty();
   t.soc = pack.soc;
   t.step_s = usual_step_s(pack);
   double v_rc_v = 0, by_tau_v = 0, last_s = pack.time_s.front();

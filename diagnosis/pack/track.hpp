@@ -19,6 +19,7 @@ struct Track {
   double capacity_ah = 0;
   double step_s = 1;                         ///< usual time between rows
   std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
+  bool is_calibrated = false;                ///< the resistances follow from this pack
   std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file
   std::vector<double> v_rc_by_tau_v;         ///< derivative of v_rc_v by ln(R1 C1)
   std::vector<double> days;                  ///< since the start
