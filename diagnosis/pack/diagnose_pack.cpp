@@ -129,6 +129,18 @@ void accuse(State& s) {
   }
 }
 
+/// Accusations that the last fit no longer supports.
+void drop_unsupported(State& s) {
+  const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
+  const std::vector<Accusation> all = s.accused;
+  std::erase_if(s.accused, [&](const Accusation& a) {
+    if (std::find(s.late.begin(), s.late.end(), a) != s.late.end()) return false;
+    std::vector<Accusation> others = all;
+    std::erase(others, a);
+    return likelihood.gain(others, a, likelihood.last_checkpoint()) < likelihood.least_gain();
+  });
+}
+
 void fit_and_accuse(State& s) {
   s.healthy = least_spread(s.track.r0_ohm);
   s.noise = {.white_v = limits.noise.white_v, .fast_v = limits.noise.fast_v, .slow_v = limits.noise.slow_v};
@@ -155,6 +167,7 @@ void fit_and_accuse(State& s) {
   fit_all(s, false, done.second, done.third);
   accuse(s);
   fit_all(s, false, done.third, 1);
+  drop_unsupported(s);
 }
 
 /// First time from which on this accusation was named and was the best one.
@@ -187,11 +200,10 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
     if (std::find(others.begin(), others.end(), rival) != others.end()) continue;
     std::vector<Accusation> instead = others;
     instead.push_back(rival);
-    double odds = std::exp(likelihood.gain(others, rival, now) - f.gain);
+    const bool alike = rival.cell == a.cell && are_alike(a.cause, rival.cause);
+    double odds = std::exp(likelihood.gain(others, rival, now) - f.gain + (alike ? limits.alike_margin : 0));
     // the data want both of two that are alike: which one it is cannot be said
-    if (rival.cell == a.cell && are_alike(a.cause, rival.cause) &&
-        likelihood.gain(s.accused, rival, now) >= likelihood.least_gain())
-      odds = std::max(odds, 1.0);
+    if (alike && likelihood.gain(s.accused, rival, now) >= likelihood.least_gain()) odds = std::max(odds, 1.0);
     if (!likelihood.is_possible(rival, likelihood.size(instead, rival, now))) continue;
     sum += odds;
     f.rivals.push_back({rival.cause, rival.cell, odds});

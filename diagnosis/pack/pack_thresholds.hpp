@@ -55,6 +55,7 @@ struct PackThresholds {
   double least_odds = 4;         ///< [ln] posterior odds from which on a cause is named
   double further_in_cell = 6;    ///< [ln] more for a further cause in the same cell,
   double share_of_first = 0.03;  ///< and this share of what the first one gained: its model is not better
+  double alike_margin = 4;       ///< [ln] that does not separate two alike causes: no model is as exact as that
   double least_sigmas = 4;       ///< size over its standard deviation
   double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
   double listed_from = 0.01;     ///< probability from which on another cause is listed
@@ -93,7 +94,7 @@ struct PackThresholds {
     double late_rows = 1.5;                 ///< from which on a lag is certain
     double grouped_share = 0.25;            ///< more channels than that are a group that is read later
     double least_rows_late = 0.5;           ///< of a delay that is named: less is a matter of the sampling
-    double staggered_s = 0.05;              ///< spread of sampling times that is reported
+    double staggered_s = 0.07;              ///< spread of sampling times that is reported
     double staggered_sigmas = 6;            ///< the same over its standard deviation
     double missing_share = 0.2;             ///< of readings
     double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
