@@ -201,7 +201,9 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
     std::vector<Accusation> instead = others;
     instead.push_back(rival);
     const bool alike = rival.cell == a.cell && are_alike(a.cause, rival.cause);
-    double odds = std::exp(likelihood.gain(others, rival, now) - f.gain + (alike ? limits.alike_margin : 0));
+    const double lead = f.gain - likelihood.gain(others, rival, now);
+    double odds = std::exp(-lead);
+    if (alike) odds = std::max(odds, std::exp(std::min(0.0, limits.alike_margin - lead)));
     // the data want both of two that are alike: which one it is cannot be said
     if (alike && likelihood.gain(s.accused, rival, now) >= likelihood.least_gain()) odds = std::max(odds, 1.0);
     if (!likelihood.is_possible(rival, likelihood.size(instead, rival, now))) continue;

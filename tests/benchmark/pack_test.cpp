@@ -55,7 +55,7 @@ TEST(Pack, FindsTheOffsetOfTheCurrentSensorAndItsSizeFromTheMeanOfTheCells) {
   EXPECT_TRUE(o.wrong.empty()) << o.statement;
 }
 
-TEST(Pack, TellsAGrownResistanceFromAJointInTheSamePack) {
+TEST(Pack, SeparatesAGrownResistanceFromAJointInTheSamePack) {
   const benchmark::PackOutcome o = outcome_of(101, 1, false);
   ASSERT_EQ(o.planted[1].fault.id, "resistance_growth");
   ASSERT_EQ(o.planted[2].fault.id, "joint_resistance");
