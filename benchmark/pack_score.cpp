@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "diagnosis/pack/pack_texts.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
 
 namespace bms::benchmark {
 
@@ -29,34 +30,43 @@ bool touches(const truth::PackFault& fault, const dp::PackFinding& f) {
   return *f.cell == *fault.cell;
 }
 
+/// The answer is AMBIGUOUS, and the fault is among what else it could be.
+bool lists(const dp::PackFinding& f, const truth::PackFault& fault) {
+  return std::any_of(f.rivals.begin(), f.rivals.end(), [&](const dp::Rival& r) {
+    return dp::text_of(r.cause).id == fault.id && fault.cell == r.cell && r.probability > dp::limits.ambiguous_from;
+  });
+}
+
 PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis& d) {
   PlantedOutcome o;
   o.fault = fault;
   for (const dp::PackFinding& f : d.findings) {
     if (is_about(f, fault)) {
-      o.named = o.listed = o.cell_right = true;
+      o.named = o.cell_right = true;
       o.found = f.value;
       o.pull = f.sigma > 0 ? (f.value - fault.size) / f.sigma : 0;
       o.after_s = f.after_s.value_or(0);
+    } else if (lists(f, fault)) {
+      o.listed = true;
     }
-    o.cell_right = o.cell_right || touches(fault, f);
-    for (const dp::Rival& r : f.rivals) {
-      if (dp::text_of(r.cause).id == fault.id && fault.cell == r.cell) o.listed = true;
-    }
+    if (!touches(fault, f)) continue;
+    o.cell_right = true;
+    if (!is_about(f, fault)) o.instead += dp::sentence_of(f) + " " + dp::rivals_text(f);
   }
+  o.listed = o.listed && !o.named;
   return o;
 }
 
 struct Count {
-  std::size_t planted = 0, named = 0, listed = 0, cell = 0, sized = 0;
+  std::size_t planted = 0, named = 0, listed = 0, another = 0, missed = 0, sized = 0;
   std::vector<double> after_s;
 };
 
 std::string row_of(const std::string& name, Count c) {
   std::sort(c.after_s.begin(), c.after_s.end());
   const std::string time = c.after_s.empty() ? "" : fmt::format("{:.0f} min", c.after_s[c.after_s.size() / 2] / 60);
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed, c.cell, c.sized,
-                     time);
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed, c.another,
+                     c.missed, c.sized, time);
 }
 
 }  // namespace
@@ -72,9 +82,10 @@ PackOutcome score_pack(const truth::PackCase& c, const dp::PackDiagnosis& d) {
                            [](const truth::PackFault& f) { return f.id != "channels_staggered"; });
   for (const truth::PackFault& fault : c.faults) o.planted.push_back(outcome_of(fault, d));
   for (const dp::PackFinding& f : d.findings) {
-    const bool known = std::any_of(c.faults.begin(), c.faults.end(),
-                                   [&](const truth::PackFault& fault) { return is_about(f, fault); });
-    if (!known) o.wrong.push_back(dp::sentence_of(f));
+    const bool known = std::any_of(c.faults.begin(), c.faults.end(), [&](const truth::PackFault& fault) {
+      return is_about(f, fault) || lists(f, fault);
+    });
+    if (!known) o.wrong.push_back(dp::sentence_of(f) + " " + dp::rivals_text(f));
   }
   for (const dp::UnexplainedCell& u : d.unexplained) {
     const bool known = std::any_of(c.faults.begin(), c.faults.end(),
@@ -96,12 +107,14 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
     if (!o.healthy && !o.wrong.empty()) ++with_wrong;
     bool complete = o.wrong.empty();
     for (const PlantedOutcome& p : o.planted) {
-      complete = complete && p.named;
+      complete = complete && (p.named || p.listed);
       for (Count* c : {&by_cause[p.fault.id], p.fault.of_data ? &data : &all}) {
         ++c->planted;
         c->named += p.named ? 1 : 0;
         c->listed += p.listed ? 1 : 0;
-        c->cell += p.cell_right ? 1 : 0;
+        const bool found = p.named || p.listed;
+        c->another += !found && p.cell_right ? 1 : 0;
+        c->missed += !found && !p.cell_right ? 1 : 0;
         c->sized += p.named && std::abs(p.pull) <= 2 ? 1 : 0;
         if (p.named && p.after_s > 0) c->after_s.push_back(p.after_s);
       }
@@ -109,12 +122,12 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
     if (!o.healthy && complete) ++whole;
   }
   std::string text =
-      "| planted | cases | cell and cause right | right or listed | cell right | size within 2 sigma | "
-      "median time to name |\n|---|---|---|---|---|---|---|\n";
+      "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | another cause for this cell | missed | "
+      "right, size within 2 sigma | median time to name |\n|---|---|---|---|---|---|---|---|\n";
   for (const auto& [id, count] : by_cause) text += row_of("`" + id + "`", count);
   text += row_of("**physics and sensors**", all) + row_of("**faults of the data**", data);
   text += fmt::format(
-      "\n{} packs with faults: all of a pack right and nothing else named in {}; something else named in "
+      "\n{} packs with faults: all of a pack right or listed and nothing else named in {}; something else named in "
       "{}. {} healthy packs: nothing named in {}. Slowest pack: {:.0f} s.\n",
       faulty, whole, with_wrong, healthy, in_peace, wall_s);
   return text;
@@ -134,6 +147,7 @@ std::string pack_json(const std::vector<PackOutcome>& outcomes) {
                          {"cell_right", p.cell_right},
                          {"found", p.found},
                          {"pull", p.pull},
+                         {"instead", p.instead},
                          {"after_s", p.after_s}});
     list.push_back({{"name", o.name},
                     {"healthy", o.healthy},

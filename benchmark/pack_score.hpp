@@ -14,8 +14,9 @@ namespace bms::benchmark {
 struct PlantedOutcome {
   truth::PackFault fault;
   bool named = false;       ///< cell and cause right, as the first answer
-  bool listed = false;      ///< the right one is among what else it could be, or first
+  bool listed = false;      ///< not first, but among what else it could be: the answer is AMBIGUOUS
   bool cell_right = false;  ///< the cell, with any cause
+  std::string instead;      ///< what was said of this cell, if another cause was named first
   double found = 0;         ///< size, if named
   double pull = 0;          ///< (size - truth) / sigma, if named
   double after_s = 0;       ///< time to name; 0: unknown
@@ -28,7 +29,7 @@ struct PackOutcome {
   std::size_t cells = 0;
   std::string verdict, statement;
   std::vector<PlantedOutcome> planted;
-  std::vector<std::string> wrong;  ///< what was named and was not planted
+  std::vector<std::string> wrong;  ///< what was named, and neither it nor what else it could be was planted
 };
 
 PackOutcome score_pack(const truth::PackCase& c, const diagnosis::pack::PackDiagnosis& d);

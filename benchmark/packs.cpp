@@ -62,7 +62,7 @@ void print(const PackOutcome& o) {
   for (const auto& p : o.planted)
     fmt::print("  {} {} {} {:.4g}{}\n", word_for(p), p.fault.id,
                p.fault.cell ? fmt::format("{}", *p.fault.cell + 1) : "-", p.fault.size,
-               p.named ? fmt::format(", found {:.4g}, {:+.1f} sigma", p.found, p.pull) : "");
+               p.named ? fmt::format(", found {:.4g}, {:+.1f} sigma", p.found, p.pull) : "  " + p.instead);
   for (const std::string& text : o.wrong) fmt::print("  wrong {}\n", text);
   std::fflush(stdout);
 }

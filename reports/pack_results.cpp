@@ -32,7 +32,8 @@ Json mechanism_of(const dp::PackFinding& f) {
   const dp::CauseText& text = dp::text_of(f.cause);
   Json rivals = Json::array();
   for (const dp::Rival& r : f.rivals)
-    rivals.push_back({{"id", dp::text_of(r.cause).id}, {"cell", r.cell + 1}, {"probability", number(r.probability)}});
+    rivals.push_back(
+        {{"id", dp::text_of(r.cause).id}, {"cell", number_of(r.cell)}, {"probability", number(r.probability)}});
   const bool of_sensor = f.cause == dp::Cause::thermistor;
   return {
       {"id", dp::id_of(f)},

@@ -119,7 +119,11 @@ void add_shared(PackResult& r, const std::optional<double>& initial_soc, const P
   diagnosis::Diagnosis d = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, {c.record}, options);
   diagnosis::describe(d, r.cell.parameters, {c.record});
   r.shared = fmt::format("{}: {}", diagnosis::name_of(d.verdict), d.statement);
-  if (!diagnosis::names(d.verdict)) return;
+  const auto of_current = [](const dp::PackFinding& f) {
+    return f.cause == dp::Cause::current_offset || f.cause == dp::Cause::current_gain;
+  };
+  const bool known = std::any_of(r.diagnosis.findings.begin(), r.diagnosis.findings.end(), of_current);
+  if (known || !diagnosis::names(d.verdict)) return;
   for (const diagnosis::Finding& f : d.findings) {
     const model::MechanismInfo& info = model::catalogue[f.setting.index];
     if (!is_of_the_current_sensor(info.id)) continue;

@@ -40,7 +40,7 @@ struct Build {
   Laboratory lab;
   Inequality unequal;
   double steepness_k = 0;  ///< of the resistances by temperature
-  double staggered_s = 0;  ///< from the first to the last channel
+  double staggered_s = 0;  ///< in which all channels are read once
   double start_soc = full_soc;
   double fine_s = 0.1;
   std::vector<double> current_a;  ///< true, fine
@@ -207,7 +207,10 @@ PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
     c.recording.time_s.push_back(static_cast<double>(k) * b.setting.step_s);
   c.hours = c.recording.time_s.back() / 3'600;
   if (b.staggered_s > 0)
-    c.faults.push_back({.id = "channels_staggered", .cell = {}, .size = b.staggered_s, .of_data = true});
+    c.faults.push_back({.id = "channels_staggered",
+                        .cell = {},
+                        .size = b.staggered_s * static_cast<double>(cells - 1) / static_cast<double>(cells),
+                        .of_data = true});
   return c;
 }
 

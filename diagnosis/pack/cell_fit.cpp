@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "diagnosis/pack/noise_search.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 
 namespace bms::diagnosis::pack {
@@ -30,15 +31,21 @@ class Delayed {
     const double wanted_s = time_s_[row] - delay_s_;
     while (before_ + 2 < v_.size() && time_s_[before_ + 1] < wanted_s) ++before_;
     const double width_s = time_s_[before_ + 1] - time_s_[before_];
+    share_ = 0;
     if (!(width_s > 0)) return {v_[before_], 0, 0, 0, before_};
     const double share = std::clamp((wanted_s - time_s_[before_]) / width_s, 0.0, 1.0);
     const double step_v = v_[before_ + 1] - v_[before_];
+    share_ = share;
     return {v_[before_] + share * step_v, step_v / width_s, share, step_v, share > 0.5 ? before_ + 1 : before_};
+  }
+  /// Another column at the time of the last row.
+  double between(const std::vector<double>& values) const {
+    return (1 - share_) * values[before_] + share_ * values[before_ + 1];
   }
 
  private:
   const std::vector<double>&time_s_, &v_;
-  double delay_s_;
+  double delay_s_, share_ = 0;
   std::size_t before_ = 0;
 };
 
@@ -63,14 +70,16 @@ double change_of_soc(const Track& t, const Vector& theta, std::size_t k) {
 
 /// Additional noise of a row: the error of resistances at a step of the current, of the curve where it is steep, of the
 /// moment of sampling.
-void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di, double slope_v, double dz,
-                   const Delayed::Value& delayed, double edge, RowNoise& noise) {
+void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di, double slope_v, double steeper_v,
+                   double dz, const Delayed::Value& delayed, double edge, RowNoise& noise) {
   constexpr const PackThresholds::Noise& n = limits.noise;
   const auto square = [](double x) { return x * x; };
   const double added_share = std::abs(theta[resistance]) + std::abs(theta[joint]) / t.r0_ohm;
   noise.edge_v2[k] = square((n.edge_share + n.shape_share * added_share) * t.r0_ohm * di);
   const double independent = -std::expm1(-square(dz / n.ocv_reach));
-  noise.slow_v2[k] = square(n.ocv_axis * slope_v) + 2 * square(t.ocv_tolerance_v) * independent;
+  const double soc = t.soc[delayed.row] + dz, beyond = std::max({0.0, n.lowest_soc - soc, soc - n.highest_soc});
+  noise.slow_v2[k] = square(n.track_soc * steeper_v) + square((n.ocv_axis + n.beyond_axis * beyond) * slope_v) +
+                     2 * square(t.ocv_tolerance_v) * independent;
   // a step of the voltage lies before or after the moment of sampling, not in between; the whitener multiplies by
   // edge^2
   noise.white_v2[k] = delayed.share_of_step * (1 - delayed.share_of_step) * square(delayed.step_v / edge);
@@ -86,7 +95,7 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
   double last_a = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     const Delayed::Value late = delayed.at(k);
-    const double current_a = t.instant_a[late.row], neighbours_v = t.neighbours_v[k];
+    const double current_a = delayed.between(t.instant_a), neighbours_v = t.neighbours_v[k];
     const double di = pack.current_a[k] - last_a;
     if (std::isfinite(pack.current_a[k])) last_a = pack.current_a[k];
     const double difference_v = v[k] - neighbours_v;
@@ -96,8 +105,8 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     const auto from = model::look_up(t.cell, t.soc[then], here), to = model::look_up(t.cell, t.soc[then] + dz, there);
     const double slope_v = to.ocv_delta_v * to.per_width,
                  by_soc_v = slope_v + to.r0_delta_ohm * to.per_width * current_a;
-    // what the neighbours lose, measured: closer to the truth than the tables
-    const double all_v = late.v - from.ocv_v;
+    // what the neighbours lose; measured, it is closer to the truth than tables that were not compared with the pack
+    const double all_v = t.is_calibrated ? t.r0_by_row_ohm[then] * current_a + t.v_rc_v[then] : late.v - from.ocv_v;
     const double warmer_k = input.warmer_k.empty() || !std::isfinite(input.warmer_k[k]) ? 0 : input.warmer_k[k];
     auto row = out.columns.row(static_cast<Eigen::Index>(k));
     row[charge] = by_soc_v;
@@ -105,6 +114,9 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[leak] = -by_soc_v * t.days[then];
     row[resistance] = all_v;
     row[polarisation] = t.v_rc_v[then];
+    const double tau_v = (1 + theta[resistance] + theta[polarisation]) * t.v_rc_by_tau_v[then];
+    row[time_constant] = tau_v;
+    row[tilt] = (t.soc[then] - 0.5) * all_v;
     row[joint] = current_a;
     row[offset] = 1;
     row[gain] = late.v;
@@ -112,20 +124,20 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[delay] = -late.slope_v_per_s;
     row[temperature] = warmer_k * all_v;
     double shape_v = 0;
-    for (const Eigen::Index p : std::array<Eigen::Index, 3>{shape_1, shape_2, shape_3}) {
+    for (const Eigen::Index p : std::array<Eigen::Index, 4>{shape_1, shape_2, shape_3, shape_4}) {
       const double half_waves = static_cast<double>(p) - static_cast<double>(shape_1) + 1;
       row[p] = std::cos(std::numbers::pi * half_waves * (t.soc[then] + dz));
       shape_v += theta[p] * row[p];
     }
-    const double explained_v = to.ocv_v - from.ocv_v + (to.r0_ohm - from.r0_ohm) * current_a +
-                               (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then] + theta[resistance] * all_v +
-                               theta[polarisation] * t.v_rc_v[then] + theta[joint] * current_a + theta[offset] +
-                               theta[gain] * late.v + theta[slope] * row[slope] + late.v - neighbours_v +
-                               theta[temperature] * warmer_k * all_v + shape_v;
+    const double explained_v =
+        to.ocv_v - from.ocv_v + (to.r0_ohm - from.r0_ohm) * current_a + (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then] +
+        theta[resistance] * all_v + theta[polarisation] * t.v_rc_v[then] + theta[time_constant] * tau_v +
+        theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] + theta[gain] * late.v +
+        theta[slope] * row[slope] + late.v - neighbours_v + theta[temperature] * warmer_k * all_v + shape_v;
     row[parameter_count] = difference_v - explained_v;
     out.difference_v[k] = difference_v;
     out.usable[k] = 1;
-    add_row_noise(t, theta, k, di, slope_v, dz, late, edge, out.noise);
+    add_row_noise(t, theta, k, di, slope_v, slope_v - from.ocv_delta_v * from.per_width, dz, late, edge, out.noise);
   }
   return out;
 }
@@ -234,10 +246,9 @@ CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior
 }
 
 NoiseModel noise_of(const FitInput& input, const CellFit& fit) {
-  constexpr const PackThresholds::Noise& n = limits.noise;
   const Linearised l = linearise(input, fit.theta, 1);
   const std::vector<double>& time_s = input.pack->time_s;
-  const auto cost_of = [&](const NoiseModel& noise) {
+  return search_noise(fit.noise, time_s, [&](const NoiseModel& noise) {
     RowNoise rows = l.noise;
     for (double& white_v2 : rows.white_v2) white_v2 /= noise.edge * noise.edge;
     const Whitener whitener(noise, time_s, rows, l.usable);
@@ -247,30 +258,7 @@ NoiseModel noise_of(const FitInput& input, const CellFit& fit) {
     double square = 0;
     for (const double v : r) square += v * v;
     return square + whitener.log_determinant();
-  };
-  NoiseModel best = fit.noise;
-  double cost = cost_of(best);
-  for (const double factor : n.factors) {
-    for (bool moved = true; moved;) {
-      moved = false;
-      for (double NoiseModel::*part :
-           {&NoiseModel::white_v, &NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::edge, &NoiseModel::slow_s}) {
-        for (const double by : {factor, 1 / factor}) {
-          NoiseModel tried = best;
-          tried.*part *= by;
-          const bool is_time = part == &NoiseModel::slow_s;
-          if (is_time && (tried.slow_s < 2 * tried.fast_s || tried.slow_s > time_s.back() - time_s.front())) continue;
-          if (!is_time && part != &NoiseModel::edge && (tried.*part < n.least_v || tried.*part > n.most_v)) continue;
-          const double tried_cost = cost_of(tried);
-          if (tried_cost >= cost - limits.fit.converged) continue;
-          cost = tried_cost;
-          best = tried;
-          moved = true;
-        }
-      }
-    }
-  }
-  return best;
+  });
 }
 
 }  // namespace bms::diagnosis::pack

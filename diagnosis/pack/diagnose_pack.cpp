@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include <fmt/format.h>
 #include <Eigen/Cholesky>
 
 #include "diagnosis/pack/cell_fit.hpp"
@@ -12,6 +13,7 @@
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 #include "diagnosis/pack/sensors.hpp"
+#include "diagnosis/pack/shared_current.hpp"
 #include "diagnosis/pack/unexplained.hpp"
 #include "measurement/statistics.hpp"
 
@@ -45,10 +47,12 @@ FitInput input_of(const State& s, std::size_t cell) {
 Vector prior_of(const State& s, std::size_t cell, bool anything) {
   const Vector fault = fault_spread(s.track.r0_ohm);
   Vector prior = s.healthy;
-  const auto widen = [&](Eigen::Index p) { prior[p] = std::hypot(s.healthy[p], fault[p]); };
-  for (Eigen::Index p = 0; anything && p < prior.size(); ++p) widen(p);
+  for (Eigen::Index p = 0; anything && p < prior.size(); ++p) prior[p] = std::hypot(s.healthy[p], fault[p]);
+  for (const Cause cause : {Cause::resistance, Cause::capacity}) {
+    if (anything) widen_for(cause, s.healthy, s.track.r0_ohm, prior);
+  }
   for (const Accusation& a : s.accused) {
-    if (a.touches(cell)) widen(static_cast<Eigen::Index>(parameter_of(a.cause)));
+    if (a.touches(cell)) widen_for(a.cause, s.healthy, s.track.r0_ohm, prior);
   }
   return prior;
 }
@@ -125,6 +129,18 @@ void accuse(State& s) {
   }
 }
 
+/// Accusations that the last fit no longer supports.
+void drop_unsupported(State& s) {
+  const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
+  const std::vector<Accusation> all = s.accused;
+  std::erase_if(s.accused, [&](const Accusation& a) {
+    if (std::find(s.late.begin(), s.late.end(), a) != s.late.end()) return false;
+    std::vector<Accusation> others = all;
+    std::erase(others, a);
+    return likelihood.gain(others, a, likelihood.last_checkpoint()) < likelihood.least_gain();
+  });
+}
+
 void fit_and_accuse(State& s) {
   s.healthy = least_spread(s.track.r0_ohm);
   s.noise = {.white_v = limits.noise.white_v, .fast_v = limits.noise.fast_v, .slow_v = limits.noise.slow_v};
@@ -151,6 +167,7 @@ void fit_and_accuse(State& s) {
   fit_all(s, false, done.second, done.third);
   accuse(s);
   fit_all(s, false, done.third, 1);
+  drop_unsupported(s);
 }
 
 /// First time from which on this accusation was named and was the best one.
@@ -183,11 +200,12 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
     if (std::find(others.begin(), others.end(), rival) != others.end()) continue;
     std::vector<Accusation> instead = others;
     instead.push_back(rival);
-    double odds = std::exp(likelihood.gain(others, rival, now) - f.gain);
+    const bool alike = rival.cell == a.cell && are_alike(a.cause, rival.cause);
+    const double lead = f.gain - likelihood.gain(others, rival, now);
+    double odds = std::exp(-lead);
+    if (alike) odds = std::max(odds, std::exp(std::min(0.0, limits.alike_margin - lead)));
     // the data want both of two that are alike: which one it is cannot be said
-    if (rival.cell == a.cell && are_alike(a.cause, rival.cause) &&
-        likelihood.gain(s.accused, rival, now) >= likelihood.least_gain())
-      odds = std::max(odds, 1.0);
+    if (alike && likelihood.gain(s.accused, rival, now) >= likelihood.least_gain()) odds = std::max(odds, 1.0);
     if (!likelihood.is_possible(rival, likelihood.size(instead, rival, now))) continue;
     sum += odds;
     f.rivals.push_back({rival.cause, rival.cell, odds});
@@ -215,11 +233,13 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
 std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likelihood) {
   std::vector<double> delays, sigmas;
   for (std::size_t c = 0; c < s.fits.size(); ++c) {
-    if (s.channels.cells[c].held_s) continue;
+    const bool accused = std::any_of(s.accused.begin(), s.accused.end(), [&](const auto& a) { return a.touches(c); });
+    if (accused || s.channels.cells[c].held_s) continue;
     const Accusation a{Cause::late, c};
     const Estimated e = likelihood.size({a}, a, likelihood.last_checkpoint());
     delays.push_back(e.value);
-    sigmas.push_back(e.sigma);
+    // without the spread itself
+    sigmas.push_back(std::sqrt(std::max(0.0, e.sigma * e.sigma - s.healthy[delay] * s.healthy[delay])));
   }
   if (delays.size() < limits.unexplained.cells) return std::nullopt;
   const double sigma = measurement::median(sigmas);
@@ -231,7 +251,7 @@ std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likel
   PackFinding f;
   f.cause = Cause::staggered;
   f.value = delays[delays.size() - 1 - few] - delays[few];
-  f.sigma = std::hypot(sigma, sigma);
+  f.sigma = std::hypot(sigma, sigma, limits.spread[delay].scale * f.value);
   f.gain = spread / sigma;
   f.probability = 1;
   return f;
@@ -286,6 +306,20 @@ Verdict verdict_of(const PackDiagnosis& d) {
   return d.unexplained.empty() ? Verdict::no_mismatch : Verdict::unknown;
 }
 
+/// Takes the errors of the current sensor out of current and state of charge, before cells are compared.
+std::optional<PackFinding> correct_current(State& s, const model::CellParameters<>& cell, std::string& text) {
+  set_neighbours(s.track, s.pack, usual_cells(s.pack), mostly_held(s));
+  SharedState shared = shared_state_of(s.track, s.pack);
+  text = shared.not_tested;
+  if (!text.empty()) return std::nullopt;
+  text = fmt::format("Offset of the current sensor: {:.0f} ± {:.0f} mA.", 1e3 * shared.offset_a,
+                     1e3 * shared.offset_sigma_a);
+  s.pack.soc = std::move(shared.soc);
+  for (double& a : s.pack.current_a) a = (1 - shared.gain) * a - shared.offset_a;
+  s.track = track_of(cell, s.pack, shared.resistance_factor);
+  return std::move(shared.finding);
+}
+
 /// The cell without accusations whose fit is in the middle.
 std::size_t typical_cell(const State& s) {
   const std::vector<std::size_t> reference = reference_of(s);
@@ -313,11 +347,13 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   for (const std::size_t c : s.channels.late(s.track.step_s)) s.late.push_back({Cause::late, c});
   s.accused = s.late;
   s.bad_sensors = check_thermistors(pack);
+  const std::optional<PackFinding> of_current = correct_current(s, cell, d.current_sensor);
   fit_and_accuse(s);
   const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
   add_held(s, d.findings);
   if (const auto f = staggered(s, likelihood)) d.findings.push_back(*f);
   add_missing(s, d.findings);
+  if (of_current) d.findings.push_back(*of_current);
   for (const Accusation& a : s.accused) d.findings.push_back(finding_of(s, likelihood, a));
   d.findings.insert(d.findings.end(), s.bad_sensors.begin(), s.bad_sensors.end());
   d.findings.insert(d.findings.end(), of_voltmeter.begin(), of_voltmeter.end());

@@ -43,8 +43,9 @@ Data data_of(const Matrix& information, const Vector& healthy, const Sensor* add
   }
   if (added != nullptr) {
     Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
-    for (const Eigen::Index p : std::array<Eigen::Index, 10>{charge, capacity, leak, resistance, polarisation, slope,
-                                                             temperature, shape_1, shape_2, shape_3})
+    for (const Eigen::Index p :
+         std::array<Eigen::Index, 13>{charge, capacity, leak, resistance, polarisation, time_constant, tilt, slope,
+                                      temperature, shape_1, shape_2, shape_3, shape_4})
       into(p, p) = added->cell ? 1 : 0;
     into(joint, joint) = added->joint ? 1 : 0;
     d.information += into.transpose() * information * into;
@@ -56,11 +57,12 @@ Eigen::Index place_of(Cause cause) {
   return cause == Cause::sense_wire ? 2 * width : static_cast<Eigen::Index>(parameter_of(cause));
 }
 
-double marginal_for(const Data& d, const Eigen::VectorXd& with_data, Cause cause, const Vector& fault) {
+double marginal_for(const Data& d, const Eigen::VectorXd& with_data, Cause cause, double r0_ohm) {
   Eigen::VectorXd prior = d.healthy;
-  const Eigen::Index p = place_of(cause);
-  const double wide = cause == Cause::sense_wire ? fault[offset] : fault[p];
-  prior[p] = std::hypot(prior[p], wide);
+  if (cause == Cause::sense_wire)
+    prior[place_of(cause)] = std::hypot(prior[place_of(cause)], limits.spread[offset].fault);
+  else
+    widen_for(cause, d.healthy.head(width), r0_ohm, prior.head(width));
   return log_marginal(d.information, with_data, prior);
 }
 
@@ -70,15 +72,14 @@ double example_of(Cause cause, double r0_ohm) {
 }
 
 std::vector<std::vector<bool>> separable(const Data& d, double r0_ohm) {
-  const Vector fault = fault_spread(r0_ohm);
   std::vector<std::vector<bool>> table;
   for (const Cause present : cell_causes) {
     const Eigen::VectorXd with_data = d.information.col(place_of(present)) * example_of(present, r0_ohm);
-    const double right = marginal_for(d, with_data, present, fault),
+    const double right = marginal_for(d, with_data, present, r0_ohm),
                  nothing = log_marginal(d.information, with_data, d.healthy);
     std::vector<bool> row;
     for (const Cause other : cell_causes) {
-      const double against = other == present ? nothing : marginal_for(d, with_data, other, fault);
+      const double against = other == present ? nothing : marginal_for(d, with_data, other, r0_ohm);
       row.push_back(right - against > limits.separable_odds);
     }
     table.push_back(std::move(row));
@@ -113,7 +114,6 @@ Isolability isolability_of(const Matrix& information, const Vector& healthy, dou
 std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
                                            double least_gain) {
   const Data d = data_of(information, healthy, nullptr);
-  const Vector fault = fault_spread(r0_ohm);
   std::vector<PackLimit> list;
   for (const Cause cause : cell_causes) {
     const Parameter p = parameter_of(cause);
@@ -121,7 +121,7 @@ std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vect
     // the gain is a square of the size minus a constant
     const auto gain_at = [&](double size) {
       const Eigen::VectorXd with_data = d.information.col(place_of(cause)) * size;
-      return marginal_for(d, with_data, cause, fault) - log_marginal(d.information, with_data, d.healthy);
+      return marginal_for(d, with_data, cause, r0_ohm) - log_marginal(d.information, with_data, d.healthy);
     };
     const double constant = gain_at(0), of_example = gain_at(example_of(cause, r0_ohm)) - constant;
     if (!(of_example > 0)) continue;

@@ -79,9 +79,20 @@ double log_marginal(const Eigen::MatrixXd& information, const Eigen::VectorXd& w
   return (scaled.dot(factor.solve(scaled)) - log_determinant) / 2;
 }
 
+void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eigen::VectorXd> prior) {
+  const auto p = static_cast<Eigen::Index>(parameter_of(cause));
+  prior[p] = std::hypot(healthy[p], fault_spread(r0_ohm)[p]);
+  const bool moved = cause == Cause::imbalance || cause == Cause::capacity || cause == Cause::leakage;
+  for (Eigen::Index k = 0; k < width; ++k) {
+    const Spread& spread = limits.spread[static_cast<std::size_t>(k)];
+    if (cause == Cause::resistance) prior[k] = std::hypot(prior[k], spread.aged);
+    if (moved) prior[k] = std::hypot(prior[k], spread.moved);
+  }
+}
+
 PackLikelihood::PackLikelihood(const std::vector<CellFit>& fits, const Vector& healthy, double r0_ohm, double days,
                                double step_s)
-    : fits_(fits), healthy_(healthy), fault_(fault_spread(r0_ohm)), least_(from_limits(r0_ohm, &Spread::least)) {
+    : fits_(fits), r0_ohm_(r0_ohm), healthy_(healthy), least_(from_limits(r0_ohm, &Spread::least)) {
   least_[delay] = std::max(least_[delay], limits.channels.least_rows_late * step_s);
   // a leak must have moved the charge by what is worth a visit
   least_[leak] = std::max(least_[leak], least_[charge] / std::max(days, std::numeric_limits<double>::epsilon()));
@@ -114,11 +125,10 @@ PackLikelihood::System PackLikelihood::system_of(const std::vector<Accusation>& 
     s.prior.segment(at, width) = healthy_;
     for (const Accusation& a : accusations) {
       if (a.cause == Cause::sense_wire || a.cell != cells[k]) continue;
-      const auto p = static_cast<Eigen::Index>(parameter_of(a.cause));
-      s.prior[at + p] = std::hypot(healthy_[p], fault_[p]);
+      widen_for(a.cause, healthy_, r0_ohm_, s.prior.segment(at, width));
     }
   }
-  s.prior.tail(static_cast<Eigen::Index>(wires.size())).setConstant(fault_[offset]);
+  s.prior.tail(static_cast<Eigen::Index>(wires.size())).setConstant(limits.spread[offset].fault);
   return s;
 }
 
@@ -176,8 +186,10 @@ Estimated PackLikelihood::size(const std::vector<Accusation>& accusations, const
   unit[at] = 1;
   const Eigen::VectorXd column = factor.solve(unit);
   const double value = column.dot(s.with_data);
-  return {value,
-          std::hypot(std::sqrt(std::max(0.0, column[at])), limits.spread[parameter_of(wanted.cause)].scale * value)};
+  // what the fault adds: how much of the difference the cell had before is not known
+  const Parameter p = parameter_of(wanted.cause);
+  const double own = wanted.cause == Cause::sense_wire ? 0 : healthy_[static_cast<Eigen::Index>(p)];
+  return {value, std::hypot(std::sqrt(std::max(0.0, column[at])), own, limits.spread[p].scale * value)};
 }
 
 std::vector<Accusation> PackLikelihood::candidates_at(std::size_t cell) const {

@@ -65,7 +65,8 @@ class PackLikelihood {
   std::vector<std::size_t> cells_of(const std::vector<Accusation>& accusations, const Accusation& around) const;
 
   const std::vector<CellFit>& fits_;
-  Vector healthy_, fault_, least_;
+  double r0_ohm_;
+  Vector healthy_, least_;
 };
 
 /// Spread of each parameter over the cells without accusations; at least that of healthy cells. Robust against a
@@ -75,6 +76,9 @@ Vector healthy_spread(const std::vector<CellFit>& fits, double r0_ohm);
 Vector least_spread(double r0_ohm);
 /// Spread of faulty cells.
 Vector fault_spread(double r0_ohm);
+
+/// Widens the prior of a cell's parameters, standard deviations, for this cause in the cell.
+void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eigen::VectorXd> prior);
 
 /// The most probable accusations: added one by one, exchanged for a better one, removed if they are not needed.
 /// certain: faults of the data that were recognised before; they stay.

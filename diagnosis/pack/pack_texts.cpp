@@ -61,6 +61,15 @@ constexpr std::array texts = {
               "The pack's voltmeter and the sum of the cell voltages differ.",
               "Measure the pack's voltage with a meter and calibrate the voltmeter."},
     CauseText{"shared", "a cause that all cells share", "", "", "All cells show it.", ""},
+    CauseText{"current_offset", "a current sensor with an offset", "offset_a", "A",
+              "The sensor shows a current that does not flow. The state of charge drifts.",
+              "Read the sensor with the contactors open and calibrate its zero."},
+    CauseText{"current_gain", "a current sensor with a gain error", "gain", "1",
+              "The sensor's error grows with the current. Charge and resistances of all cells are wrong.",
+              "Compare the sensor with a second one under load."},
+    CauseText{"all_capacity", "a capacity of all cells that differs from the cell file", "loss", "1",
+              "The pack has aged as a whole, or its cell file describes another cell.",
+              "Measure the capacity of the pack and identify the cell file again."},
 };
 
 /// Factor and unit for a reader.
@@ -76,6 +85,7 @@ Shown shown(std::string_view unit) {
   if (unit == "ohm") return {1e6, "µohm", 0};
   if (unit == "V") return {1e3, "mV", 1};
   if (unit == "s") return {1, "s", 2};
+  if (unit == "A") return {1e3, "mA", 0};
   return {1, "K", 1};
 }
 
@@ -102,7 +112,11 @@ std::string relation_of(const PackFinding& f) {
     case Cause::gain:
     case Cause::thermistor:
     case Cause::pack_voltage:
+    case Cause::current_offset:
+    case Cause::current_gain:
       return up ? "too high" : "too low";
+    case Cause::all_capacity:
+      return f.value > 0 ? "less than in the cell file" : "more than in the cell file";
     case Cause::late:
       return up ? "later than its neighbours" : "earlier than its neighbours";
     case Cause::sense_wire:
@@ -138,7 +152,8 @@ std::string size_text(const PackFinding& f) {
   const bool unsigned_size = f.cause != Cause::sense_wire;
   if (unsigned_size) shown.value = std::abs(f.value);
   const std::string what = f.cause == Cause::offset || f.cause == Cause::gain || f.cause == Cause::thermistor ||
-                                   f.cause == Cause::pack_voltage
+                                   f.cause == Cause::pack_voltage || f.cause == Cause::current_offset ||
+                                   f.cause == Cause::current_gain
                                ? "reads "
                                : "";
   return what + number(shown.value, f.sigma, text_of(f.cause).unit) + " " + relation_of(f);
@@ -157,7 +172,8 @@ std::string rivals_text(const PackFinding& f) {
   std::string text;
   for (const Rival& r : f.rivals) {
     if (!text.empty()) text += "; ";
-    text += fmt::format("{}: {} ({:.0f} %)", place_of(r.cause, r.cell), text_of(r.cause).name, 100 * r.probability);
+    text += fmt::format("{}: {} ({:.0f} %)", r.cell ? place_of(r.cause, *r.cell) : "all cells", text_of(r.cause).name,
+                        100 * r.probability);
   }
   return "It could also be: " + text + ".";
 }

@@ -12,12 +12,14 @@ namespace bms::diagnosis::pack {
 
 /// The spread of one parameter over the cells of a pack.
 struct Spread {
-  double healthy;  ///< standard deviation of healthy cells, at least; the pack itself can show a larger one
-  double fault;    ///< standard deviation of a faulty one
-  double least;    ///< a smaller size is not worth a visit and is never named
-  double example;  ///< size for the table of what can be separated
-  double most;     ///< spread that a pack may show, over `healthy`
-  double scale;    ///< relative error of a size: what all cells share is not known better
+  double healthy;    ///< standard deviation of healthy cells, at least; the pack itself can show a larger one
+  double fault;      ///< standard deviation of a faulty one
+  double least;      ///< a smaller size is not worth a visit and is never named
+  double example;    ///< size for the table of what can be separated
+  double most;       ///< spread that a pack may show, over `healthy`
+  double scale;      ///< relative error of a size: what all cells share is not known better
+  double aged = 0;   ///< in a cell with a higher resistance: R0 and R1 do not grow alike; a joint changes neither
+  double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve do not cancel
 };
 
 struct PackThresholds {
@@ -26,20 +28,23 @@ struct PackThresholds {
       {0.004, 0.06, 0.015, 0.04, 6, 0.05},     // charge: a balanced pack is good to 1 %
       {0.010, 0.15, 0.04, 0.12, 6, 0.1},       // capacity: cells of a batch differ by 1 %
       {0.0005, 0.03, 0.003, 0.02, 6, 0.1},     // leak: 1 % a month is healthy
-      {0.03, 0.5, 0.12, 0.3, 6, 0.05},         // resistance
-      {0.05, 0, 0, 0, 12, 0},                  // polarisation: no cause of its own
-      {0.02, 0.5, 0.12, 0.3, 6, 0.05},         // joint
+      {0.03, 0.5, 0.12, 0.3, 4, 0.05},         // resistance
+      {0.05, 0, 0, 0, 4, 0, 0.15},             // polarisation: no cause of its own
+      {0.05, 0, 0, 0, 4, 0, 0.3},              // time constant
+      {0.02, 0, 0, 0, 6, 0, 0.15},             // tilt
+      {0.02, 0.5, 0.12, 0.3, 1.5, 0.05},       // joint
       {0.001, 0.03, 0.004, 0.010, 12, 0.02},   // offset: what a monitor's datasheet states
       {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},  // gain: as stated; what varies with the voltage is the slope
       {0.0005, 0, 0, 0, 8, 0},                 // slope: no cause of its own
       {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
       {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
-      {0.0005, 0, 0, 0, 8, 0},                 // shapes of the OCV curve: healthy cells age differently
-      {0.0005, 0, 0, 0, 8, 0},
-      {0.0005, 0, 0, 0, 8, 0},
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},       // shapes of the OCV curve: healthy cells age differently
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
   }};
-  double most_spread = 12;  ///< of the spread that a pack may show, over that of healthy cells
-  double outlying_share = 0.2, outlying_cells = 2.5;     ///< so many cells of a pack may be faulty in one parameter
+  double most_spread = 12;                          ///< of the spread that a pack may show, over that of healthy cells
+  double outlying_share = 0.2, outlying_cells = 4;  ///< so many cells of a pack may be faulty in one parameter
   double widest_quantile = 4, quantile_accuracy = 1e-4;  ///< of the search for a quantile of the normal distribution
   double hours_per_day = 24;
   double instant_rows = 30;  ///< differences to the model that last longer are not steps within a row
@@ -50,6 +55,7 @@ struct PackThresholds {
   double least_odds = 4;         ///< [ln] posterior odds from which on a cause is named
   double further_in_cell = 6;    ///< [ln] more for a further cause in the same cell,
   double share_of_first = 0.03;  ///< and this share of what the first one gained: its model is not better
+  double alike_margin = 4;       ///< [ln] that does not separate two alike causes: no model is as exact as that
   double least_sigmas = 4;       ///< size over its standard deviation
   double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
   double listed_from = 0.01;     ///< probability from which on another cause is listed
@@ -61,8 +67,11 @@ struct PackThresholds {
     double quiet_c = 0.01;                    ///< [C] step of the current below which second differences show the noise
     double white_v = 0.001;                   ///< if there are too few quiet rows
     double fast_v = 0.0005, slow_v = 0.0005;  ///< starting values
-    double edge_share = 0.01;   ///< of R0 times a step of the current: error at the step, before it is learned
-    double ocv_axis = 0.001;    ///< error of the OCV's SOC axis between cells
+    double edge_share = 0.01;  ///< of R0 times a step of the current: error at the step, before it is learned
+    double ocv_axis = 0.001;   ///< error of the OCV's SOC axis between cells
+    double lowest_soc = 0.04, highest_soc = 0.98;  ///< beyond, the curve of the cell file is not to be trusted:
+    double beyond_axis = 0.5;                      ///< error of the axis as a share of the distance
+    double track_soc = 0.006;   ///< error of the state of charge that all cells share: it matters where slopes differ
     double ocv_reach = 0.02;    ///< difference in SOC over which errors of the OCV curve become independent
     double shape_share = 0.02;  ///< error of a resistance's course, as a share of what a fault adds to it
     double jitter_s = 0.002;    ///< of the sampling
@@ -85,7 +94,7 @@ struct PackThresholds {
     double late_rows = 1.5;                 ///< from which on a lag is certain
     double grouped_share = 0.25;            ///< more channels than that are a group that is read later
     double least_rows_late = 0.5;           ///< of a delay that is named: less is a matter of the sampling
-    double staggered_s = 0.05;              ///< spread of sampling times that is reported
+    double staggered_s = 0.07;              ///< spread of sampling times that is reported
     double staggered_sigmas = 6;            ///< the same over its standard deviation
     double missing_share = 0.2;             ///< of readings
     double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
@@ -103,6 +112,26 @@ struct PackThresholds {
     double pack_sigmas = 5;         ///< times the healthy spread, from which on it is named
     double parallel_v = 0.002;      ///< error of a cell's channel that all cells share
   } sensors;
+
+  /// Of the mean of the cells against the cell file. Sizes in C: of the current that charges the cell in an hour.
+  struct Shared {
+    static constexpr int ocv_waves = 6, resistance_waves = 3;
+    double block_s = 10, block_rows = 6;  ///< length of a block, at least
+    double longest_gap_s = 600, longest_step_s = 60, least_hours = 0.5;
+    double start_soc = 0.05;                                 ///< standard deviation of the start
+    double healthy_offset_c = 0.0012, healthy_gain = 0.004;  ///< of a current sensor
+    double healthy_capacity = 0.01;                          ///< of all cells, against the cell file
+    double resistance = 0.3, polarisation = 0.1, per_k = 0.03, resistance_wave = 0.03;
+    double least_factor = 0.3;  ///< of the resistances against the cell file
+    double fault_offset_c = 0.03, fault_gain = 0.1, fault_capacity = 0.15;
+    double least_offset_c = 0.004, least_gain = 0.02, least_capacity = 0.04, most_capacity = 0.5;
+    double soc_axis = 0.003, soc_walk = 0.0015;      ///< error of the SOC; the same after an hour
+    double slope_reach = 0.005;                      ///< [SOC] over which the slope of the OCV is taken
+    double most_offset_c = 0.04, search_soc = 0.02;  ///< of the search for a start: range, steps of the charge
+    double most_start = 0.06, start_step = 0.01;
+    double white_v = 0.0005, fast_v = 0.001, slow_v = 0.001;  ///< before the noise is learned
+    int iterations = 8;
+  } shared;
 
   struct Unexplained {
     double block_s = 300;    ///< over which unexplained differences are averaged

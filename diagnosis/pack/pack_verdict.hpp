@@ -14,7 +14,7 @@ namespace bms::diagnosis::pack {
 
 struct Rival {
   Cause cause = Cause::imbalance;
-  std::size_t cell = 0;
+  std::optional<std::size_t> cell;  ///< nothing: all cells
   double probability = 0;
 };
 
@@ -61,6 +61,7 @@ struct PackDiagnosis {
   std::vector<PackFinding> findings;  ///< faults of the data first
   std::vector<UnexplainedCell> unexplained;
   Channels channels;
+  std::string current_sensor;  ///< what the mean of the cells shows of it, or why it was not tested
   Isolability isolability;
   std::vector<PackLimit> detection_limits;
   std::vector<std::size_t> reference;  ///< cells that served as the neighbours

@@ -20,17 +20,15 @@ constexpr const PackThresholds::Sensors& of_sensors = limits.sensors;
 /// Log density of a centred normal variable.
 double log_normal(double x, double sigma) { return -std::log(sigma) - x * x / (2 * sigma * sigma); }
 
-/// By row: median of all sensors but one.
-std::vector<double> median_of_others(const PackRecording& pack, std::size_t sensor) {
-  std::vector<double> others, values;
+/// By row: median of all sensors. With three of them, a faulty one does not move it.
+std::vector<double> median_of_sensors(const PackRecording& pack) {
+  std::vector<double> medians, values;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     values.clear();
-    for (std::size_t m = 0; m < pack.sensor_c.size(); ++m) {
-      if (m != sensor) values.push_back(pack.sensor_c[m][k]);
-    }
-    others.push_back(measurement::median(values));
+    for (const auto& sensor : pack.sensor_c) values.push_back(sensor[k]);
+    medians.push_back(measurement::median(values));
   }
-  return others;
+  return medians;
 }
 
 /// Means over blocks of rows in which all cells have a reading.
@@ -71,10 +69,10 @@ std::vector<PackFinding> check_thermistors(const PackRecording& pack) {
   const std::size_t sensors = pack.sensor_c.size();
   if (sensors < of_sensors.least_sensors) return findings;
   std::vector<double> apart(sensors), at_start(sensors);
+  const std::vector<double> middle_c = median_of_sensors(pack);
   for (std::size_t m = 0; m < sensors; ++m) {
-    const std::vector<double> others = median_of_others(pack, m);
     std::vector<double> differences;
-    for (std::size_t k = 0; k < pack.rows(); ++k) differences.push_back(pack.sensor_c[m][k] - others[k]);
+    for (std::size_t k = 0; k < pack.rows(); ++k) differences.push_back(pack.sensor_c[m][k] - middle_c[k]);
     apart[m] = measurement::median(differences);
     differences.resize(std::min(differences.size(), of_sensors.start_rows));
     at_start[m] = measurement::median(differences);
@@ -159,7 +157,7 @@ std::vector<PackFinding> check_pack_voltage(const PackRecording& pack, const Tra
     PackFinding f;
     f.cause = cause;
     f.value = value / scale;
-    f.sigma = sigma / scale;
+    f.sigma = all / scale;
     f.gain = value * value / (2 * all * all);
     f.probability = 1 - std::exp(-f.gain) / limits.fault_prior;
     findings.push_back(std::move(f));

@@ -15,15 +15,16 @@ namespace {
 void set_instant(Track& track, const PackRecording& pack) {
   track.instant_a = pack.current_a;
   double slow_v = no_value, last_s = pack.time_s.front();
-  std::uint8_t interval = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     const double apart_v = track.neighbours_v[k] - track.model_v[k];
     if (!std::isfinite(apart_v)) continue;
     if (!std::isfinite(slow_v)) slow_v = apart_v;
     const double step_s = pack.time_s[k] - last_s;
     last_s = pack.time_s[k];
-    const double r0_ohm = model::look_up(track.cell, track.soc[k], interval).r0_ohm;
-    track.instant_a[k] += (apart_v - slow_v) / r0_ohm;
+    const double next_a = k + 1 < pack.rows() ? pack.current_a[k + 1] : pack.current_a[k];
+    // where the current is constant the measured one is better
+    if (std::abs(next_a - pack.current_a[k]) > limits.noise.quiet_c * track.capacity_ah)
+      track.instant_a[k] += (apart_v - slow_v) / track.r0_by_row_ohm[k];
     slow_v += -std::expm1(-std::max(step_s, 0.0) / (limits.instant_rows * track.step_s)) * (apart_v - slow_v);
   }
 }
@@ -36,25 +37,31 @@ double usual_step_s(const PackRecording& pack) {
   return std::max(measurement::median(steps), std::numeric_limits<double>::epsilon());
 }
 
-Track track_of(const model::CellParameters<>& cell, const PackRecording& pack) {
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor) {
   const PreparedCell prepared = model::prepare<double, model::max_intervals>(cell);
   Track t;
   t.cell = prepared;
   t.r0_ohm = model::look_up(t.cell, 0.5).r0_ohm;
   t.ocv_tolerance_v = cell.tolerance.ocv_v;
   t.capacity_ah = cell.capacity_ah;
+  t.is_calibrated = !factor.empty();
   t.soc = pack.soc;
   t.step_s = usual_step_s(pack);
-  double v_rc_v = 0, last_s = pack.time_s.front();
+  double v_rc_v = 0, by_tau_v = 0, last_s = pack.time_s.front();
   std::uint8_t interval = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
     const double dt_s = pack.time_s[k] - last_s;
     last_s = pack.time_s[k];
     const auto at = model::look_up(t.cell, t.soc[k], interval);
-    v_rc_v += -std::expm1(-dt_s / (at.r1_ohm * at.c1_f)) * (at.r1_ohm * current_a - v_rc_v);
+    const double share = dt_s / (at.r1_ohm * at.c1_f), decay = std::exp(-share);
+    const double f = factor.empty() ? 1 : factor[k], missing_v = f * at.r1_ohm * current_a - v_rc_v;
+    by_tau_v = decay * (by_tau_v - share * missing_v);
+    v_rc_v += -std::expm1(-share) * missing_v;
     t.v_rc_v.push_back(v_rc_v);
-    t.model_v.push_back(at.ocv_v + v_rc_v + at.r0_ohm * current_a);
+    t.v_rc_by_tau_v.push_back(by_tau_v);
+    t.model_v.push_back(at.ocv_v + v_rc_v + f * at.r0_ohm * current_a);
+    t.r0_by_row_ohm.push_back(f * at.r0_ohm);
     t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));
   }
   return t;

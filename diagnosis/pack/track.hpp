@@ -19,6 +19,9 @@ struct Track {
   double capacity_ah = 0;
   double step_s = 1;                         ///< usual time between rows
   std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
+  bool is_calibrated = false;                ///< the resistances follow from this pack
+  std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file
+  std::vector<double> v_rc_by_tau_v;         ///< derivative of v_rc_v by ln(R1 C1)
   std::vector<double> days;                  ///< since the start
   double mean_v = 0;                         ///< of the neighbours
   std::vector<double> neighbours_v;          ///< mean voltage of the cells that serve as the reference; NaN: unknown
@@ -30,8 +33,8 @@ struct Track {
 /// Median time between rows.
 double usual_step_s(const PackRecording& pack);
 
-/// Without neighbours_v and instant_a.
-Track track_of(const model::CellParameters<>& cell, const PackRecording& pack);
+/// Without neighbours_v and instant_a. factor: by row, on the resistances of the cell file; empty: 1.
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor = {});
 
 /// Sets neighbours_v and instant_a: the mean of these cells. Rows in which less than half of them have a reading have
 /// no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells; for held channels.

@@ -1,4 +1,7 @@
 // Simulated packs with planted faults: the cell and the cause are named, and nothing else.
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "benchmark/pack_score.hpp"
@@ -39,6 +42,24 @@ TEST(Pack, FindsAHeldChannelAndHowLong) {
   ASSERT_EQ(o.planted.front().fault.id, "channel_held");
   EXPECT_TRUE(o.planted.front().named) << o.statement;
   EXPECT_EQ(o.planted.front().found, o.planted.front().fault.size);
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+TEST(Pack, FindsTheOffsetOfTheCurrentSensorAndItsSizeFromTheMeanOfTheCells) {
+  const benchmark::PackOutcome o = outcome_of(101, 0, false);
+  const auto is_offset = [](const benchmark::PlantedOutcome& p) { return p.fault.id == "current_offset"; };
+  const auto offset = std::find_if(o.planted.begin(), o.planted.end(), is_offset);
+  ASSERT_NE(offset, o.planted.end());
+  EXPECT_TRUE(offset->named) << o.statement;
+  EXPECT_LT(std::abs(offset->pull), 3);
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+TEST(Pack, SeparatesAGrownResistanceFromAJointInTheSamePack) {
+  const benchmark::PackOutcome o = outcome_of(101, 1, false);
+  ASSERT_EQ(o.planted[1].fault.id, "resistance_growth");
+  ASSERT_EQ(o.planted[2].fault.id, "joint_resistance");
+  for (const benchmark::PlantedOutcome& p : o.planted) EXPECT_TRUE(p.named) << p.fault.id << ": " << o.statement;
   EXPECT_TRUE(o.wrong.empty()) << o.statement;
 }
 

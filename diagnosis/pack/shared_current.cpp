@@ -1,0 +1,345 @@
+#include "diagnosis/pack/shared_current.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include <Eigen/Cholesky>
+
+#include "diagnosis/noise.hpp"
+#include "diagnosis/pack/noise_search.hpp"
+#include "diagnosis/pack/pack_likelihood.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/shared_blocks.hpp"
+#include "measurement/statistics.hpp"
+
+namespace bms::diagnosis::pack {
+
+namespace {
+
+constexpr const PackThresholds::Shared& shared = limits.shared;
+
+enum Unknown : Eigen::Index {
+  start,
+  sensor_offset,
+  sensor_gain,
+  all_capacity,
+  all_resistance,
+  all_polarisation,
+  warmth,
+  level,
+  wave_1,
+  resistance_wave_1 = wave_1 + PackThresholds::Shared::ocv_waves,
+  unknowns = resistance_wave_1 + PackThresholds::Shared::resistance_waves
+};
+using Unknowns = Eigen::Matrix<double, unknowns, 1>;
+
+struct Problem {
+  const Track& track;
+  const PackRecording& pack;
+  std::vector<double> charge;  ///< by row: that the sensor has counted, over the capacity
+  Blocks blocks;
+  Unknowns healthy = Unknowns::Zero();
+};
+
+double or_zero(double value) { return std::isfinite(value) ? value : 0; }
+
+Unknowns healthy_of(const Track& t) {
+  Unknowns u = Unknowns::Constant(t.ocv_tolerance_v / std::numbers::sqrt2);
+  u[start] = shared.start_soc;
+  u[sensor_offset] = shared.healthy_offset_c * t.capacity_ah;
+  u[sensor_gain] = shared.healthy_gain;
+  u[all_capacity] = shared.healthy_capacity;
+  u[all_resistance] = shared.resistance;
+  u[all_polarisation] = shared.polarisation;
+  u[warmth] = shared.per_k;
+  u[level] = t.ocv_tolerance_v;
+  for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = shared.resistance_wave;
+  return u;
+}
+
+/// State of charge and RC voltage by row for these unknowns.
+struct Course {
+  std::vector<double> soc, v_rc_v;
+};
+
+Course course_of(const Problem& p, const Unknowns& u) {
+  Course c;
+  const std::size_t rows = p.pack.rows();
+  c.soc.reserve(rows);
+  c.v_rc_v.reserve(rows);
+  double v_rc_v = 0;
+  std::uint8_t interval = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double lasted_s = p.pack.time_s[k] - p.pack.time_s.front();
+    const double lost = u[sensor_offset] * lasted_s / (3'600 * p.track.capacity_ah);
+    c.soc.push_back(p.track.soc.front() + u[start] +
+                    (1 + u[all_capacity]) * ((1 - u[sensor_gain]) * p.charge[k] - lost));
+    const double current_a = (1 - u[sensor_gain]) * or_zero(p.pack.current_a[k]) - u[sensor_offset];
+    const double dt_s = k > 0 ? p.pack.time_s[k] - p.pack.time_s[k - 1] : 0;
+    const auto at = model::look_up(p.track.cell, c.soc[k], interval);
+    v_rc_v += -std::expm1(-dt_s / (at.r1_ohm * at.c1_f)) * (at.r1_ohm * current_a - v_rc_v);
+    c.v_rc_v.push_back(v_rc_v);
+  }
+  return c;
+}
+
+/// The linear model around u, white.
+struct Around {
+  Unknowns u = Unknowns::Zero();
+  NoiseModel noise;
+  Eigen::Matrix<double, unknowns, unknowns> information;
+  Unknowns with_data;
+  double cost = std::numeric_limits<double>::infinity();  ///< -2 log posterior but for a constant
+  std::vector<double> residual_v;
+  RowNoise rows;
+};
+
+double slope_at(const Track& t, double soc) {
+  const double reach = shared.slope_reach;
+  return (model::look_up(t.cell, soc + reach).ocv_v - model::look_up(t.cell, soc - reach).ocv_v) / (2 * reach);
+}
+
+/// The columns of one block, and last what u does not explain.
+void set_row(const Problem& p, const Unknowns& u, std::size_t block, double soc, double v_rc_v, Columns& columns) {
+  const Blocks& b = p.blocks;
+  const auto at = model::look_up(p.track.cell, soc);
+  const double current_a = (1 - u[sensor_gain]) * b.current_a[block] - u[sensor_offset];
+  const double hours = (b.time_s[block] - p.pack.time_s.front()) / 3'600, r0_v = at.r0_ohm * current_a;
+  const double slope_v = slope_at(p.track, soc), moved = soc - p.track.soc.front() - u[start];
+  auto row = columns.row(static_cast<Eigen::Index>(block));
+  row[start] = slope_v;
+  row[sensor_offset] = -slope_v * hours / p.track.capacity_ah - at.r0_ohm - at.r1_ohm;
+  row[sensor_gain] = -slope_v * moved - r0_v - v_rc_v;
+  row[all_capacity] = slope_v * moved;
+  row[all_resistance] = r0_v + v_rc_v;
+  row[all_polarisation] = v_rc_v;
+  row[warmth] = b.warmer_k[block] * (r0_v + v_rc_v);
+  row[level] = 1;
+  const auto wave = [&](Eigen::Index k) { return std::cos(std::numbers::pi * static_cast<double>(k + 1) * soc); };
+  for (Eigen::Index k = 0; k < PackThresholds::Shared::ocv_waves; ++k) row[wave_1 + k] = wave(k);
+  for (Eigen::Index k = 0; k < PackThresholds::Shared::resistance_waves; ++k)
+    row[resistance_wave_1 + k] = wave(k) * (r0_v + v_rc_v);
+  double model_v = at.ocv_v + r0_v + v_rc_v;
+  for (Eigen::Index k = all_resistance; k < unknowns; ++k) model_v += row[k] * u[k];
+  row[unknowns] = b.voltage_v[block] - model_v;
+}
+
+Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const NoiseModel& noise) {
+  const std::size_t blocks = p.blocks.count();
+  const Course course = course_of(p, u);
+  const std::vector<double> soc = p.blocks.means(course.soc), v_rc_v = p.blocks.means(course.v_rc_v);
+  Around a;
+  a.u = u;
+  a.noise = noise;
+  a.rows = RowNoise(blocks);
+  Columns columns(static_cast<Eigen::Index>(blocks), unknowns + 1);
+  for (std::size_t k = 0; k < blocks; ++k) {
+    set_row(p, u, k, soc[k], v_rc_v[k], columns);
+    const double hours = (p.blocks.time_s[k] - p.pack.time_s.front()) / 3'600;
+    const double axis2 = shared.soc_axis * shared.soc_axis + shared.soc_walk * shared.soc_walk * hours;
+    const double slope_v = columns(static_cast<Eigen::Index>(k), start);
+    a.rows.slow_v2[k] = axis2 * slope_v * slope_v;
+    a.residual_v.push_back(columns(static_cast<Eigen::Index>(k), unknowns));
+  }
+  const Whitener whitener(noise, p.blocks.time_s, a.rows, std::vector<char>(blocks, 1));
+  whitener.whiten(columns);
+  const auto of_unknowns = columns.leftCols<unknowns>();
+  a.information = of_unknowns.transpose() * of_unknowns;
+  a.with_data = of_unknowns.transpose() * columns.col(unknowns) + a.information * u;
+  a.cost =
+      columns.col(unknowns).squaredNorm() + whitener.log_determinant() + (u.array() / prior.array()).square().sum();
+  return a;
+}
+
+Unknowns most_probable(const Around& a, const Unknowns& prior) {
+  Eigen::Matrix<double, unknowns, unknowns> normal = a.information;
+  normal.diagonal() += prior.array().square().inverse().matrix();
+  return normal.ldlt().solve(a.with_data);
+}
+
+Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
+  Around best = around(p, from, prior, noise);
+  for (int i = 0; i < shared.iterations; ++i) {
+    const Unknowns step = most_probable(best, prior) - best.u;
+    const double before = best.cost;
+    double share = 1;
+    bool better = false;
+    for (int h = 0; h <= limits.fit.halvings && !better; ++h, share /= 2) {
+      Around next = around(p, best.u + share * step, prior, noise);
+      better = next.cost < best.cost;
+      if (better) best = std::move(next);
+    }
+    if (!better || before - best.cost < limits.fit.converged) break;
+  }
+  return best;
+}
+
+/// A coarse search over start and offset: the OCV bends, and a fit may end where another one is better.
+Unknowns starting_point(const Problem& p) {
+  const Blocks& b = p.blocks;
+  const std::vector<double> charge = p.blocks.means(p.charge);
+  const std::size_t every = std::max<std::size_t>(1, charge.size() / limits.fit.starting_rows);
+  Unknowns best = Unknowns::Zero();
+  double least = std::numeric_limits<double>::infinity();
+  // a step of the search moves the charge at the end by little
+  const double hours_all = (p.pack.time_s.back() - p.pack.time_s.front()) / 3'600, most_c = shared.most_offset_c,
+               step_c = most_c / std::ceil(most_c * hours_all / shared.search_soc);
+  for (double offset_c = -most_c; offset_c <= most_c + step_c / 2; offset_c += step_c) {
+    for (double z = -shared.most_start; z <= shared.most_start + shared.start_step / 2; z += shared.start_step) {
+      Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * std::numeric_limits<double>::epsilon();
+      Eigen::Vector2d right = Eigen::Vector2d::Zero();
+      double square = 0;
+      std::uint8_t interval = 0;
+      for (std::size_t k = every - 1; k < charge.size(); k += every) {
+        const double hours = (b.time_s[k] - p.pack.time_s.front()) / 3'600;
+        const double soc = p.track.soc.front() + z + charge[k] - offset_c * hours;
+        const double y = b.voltage_v[k] - model::look_up(p.track.cell, soc, interval).ocv_v;
+        const Eigen::Vector2d column(1, b.current_a[k] - offset_c * p.track.capacity_ah);
+        normal += column * column.transpose();
+        right += y * column;
+        square += y * y;
+      }
+      const double rest = square - right.dot(normal.ldlt().solve(right));
+      if (rest >= least) continue;
+      least = rest;
+      best[start] = z;
+      best[sensor_offset] = offset_c * p.track.capacity_ah;
+    }
+  }
+  return best;
+}
+
+NoiseModel noise_of(const Problem& p, const Around& a) {
+  const std::vector<char> usable(a.residual_v.size(), 1);
+  return search_noise(a.noise, p.blocks.time_s, [&](const NoiseModel& noise) {
+    const Whitener whitener(noise, p.blocks.time_s, a.rows, usable);
+    std::vector<double> r = a.residual_v;
+    whitener.whiten(0, r);
+    double square = 0;
+    for (const double v : r) square += v * v;
+    return square + whitener.log_determinant();
+  });
+}
+
+/// By row, on the resistances of the cell file.
+std::vector<double> factor_of(const Problem& p, const Unknowns& u, const std::vector<double>& soc) {
+  std::vector<double> factor;
+  const std::vector<double> warmer_k = warmer_than_at_start(p.pack);
+  for (std::size_t k = 0; k < soc.size(); ++k) {
+    double f = 1 + u[all_resistance] + u[warmth] * warmer_k[k];
+    for (Eigen::Index w = 0; w < PackThresholds::Shared::resistance_waves; ++w)
+      f += u[resistance_wave_1 + w] * std::cos(std::numbers::pi * static_cast<double>(w + 1) * soc[k]);
+    factor.push_back(std::max(shared.least_factor, f));
+  }
+  return factor;
+}
+
+std::string reason_not_to_test(const Track& t, const PackRecording& pack) {
+  for (std::size_t k = 1; k < pack.rows(); ++k) {
+    if (pack.time_s[k] - pack.time_s[k - 1] > shared.longest_gap_s)
+      return "Not tested: the recording has gaps, in which the charge is unknown.";
+  }
+  if (pack.time_s.back() - pack.time_s.front() < shared.least_hours * 3'600)
+    return "Not tested: the recording is too short.";
+  if (t.step_s > shared.longest_step_s) return "Not tested: the rows are too far apart.";
+  std::size_t finite = 0;
+  for (const double v : t.neighbours_v) finite += std::isfinite(v) ? 1 : 0;
+  if (2 * finite < pack.rows()) return "Not tested: most readings are missing or held.";
+  return "";
+}
+
+struct Hypothesis {
+  Eigen::Index unknown;
+  Cause cause;
+  double fault, least;
+  double gain = 0;  ///< log likelihood ratio to a healthy sensor
+};
+
+double gain_of(const Around& a, const Unknowns& healthy, Eigen::Index unknown, double fault) {
+  Unknowns prior = healthy;
+  prior[unknown] = std::hypot(prior[unknown], fault);
+  return log_marginal(a.information, a.with_data, prior) - log_marginal(a.information, a.with_data, healthy);
+}
+
+PackFinding finding_for(const Around& a, const Unknowns& healthy, const Hypothesis& h) {
+  Unknowns prior = healthy;
+  prior[h.unknown] = std::hypot(prior[h.unknown], h.fault);
+  Eigen::Matrix<double, unknowns, unknowns> normal = a.information;
+  normal.diagonal() += prior.array().square().inverse().matrix();
+  Unknowns unit = Unknowns::Zero();
+  unit[h.unknown] = 1;
+  const Unknowns column = normal.ldlt().solve(unit);
+  PackFinding f;
+  f.cause = h.cause;
+  f.value = column.dot(a.with_data);
+  f.sigma = std::hypot(std::sqrt(std::max(0.0, column[h.unknown])), healthy[h.unknown]);
+  f.gain = h.gain;
+  return f;
+}
+
+std::optional<PackFinding> judge(const Problem& p, const Around& a) {
+  const double q = p.track.capacity_ah;
+  std::array<Hypothesis, 3> list = {{
+      {sensor_offset, Cause::current_offset, shared.fault_offset_c * q, shared.least_offset_c * q, 0},
+      {sensor_gain, Cause::current_gain, shared.fault_gain, shared.least_gain, 0},
+      {all_capacity, Cause::all_capacity, shared.fault_capacity, shared.least_capacity, 0},
+  }};
+  for (Hypothesis& h : list) h.gain = gain_of(a, p.healthy, h.unknown, h.fault);
+  std::stable_sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.gain > y.gain; });
+  const Hypothesis& best = list.front();
+  const double needed = std::log(static_cast<double>(list.size()) / limits.fault_prior) + limits.least_odds;
+  PackFinding f = finding_for(a, p.healthy, best);
+  if (best.gain < needed || std::abs(f.value) < best.least || std::abs(f.value) < limits.least_sigmas * f.sigma ||
+      (best.cause == Cause::all_capacity && std::abs(f.value) > shared.most_capacity))
+    return std::nullopt;
+  double sum = 1 + std::exp(needed - limits.least_odds - best.gain);
+  for (std::size_t k = 1; k < list.size(); ++k) {
+    const double odds = std::exp(list[k].gain - best.gain);
+    if (std::abs(finding_for(a, p.healthy, list[k]).value) < list[k].least) continue;
+    sum += odds;
+    f.rivals.push_back({list[k].cause, std::nullopt, odds});
+  }
+  f.probability = 1 / sum;
+  for (Rival& r : f.rivals) r.probability *= f.probability;
+  std::erase_if(f.rivals, [](const Rival& r) { return r.probability < limits.listed_from; });
+  return f;
+}
+
+}  // namespace
+
+SharedState shared_state_of(const Track& track, const PackRecording& pack) {
+  SharedState s;
+  s.not_tested = reason_not_to_test(track, pack);
+  if (!s.not_tested.empty()) return s;
+  const Problem p{.track = track,
+                  .pack = pack,
+                  .charge = counted_charge(track, pack),
+                  .blocks = Blocks(track, pack),
+                  .healthy = healthy_of(track)};
+  Unknowns wide = p.healthy;
+  wide[sensor_offset] = shared.fault_offset_c * track.capacity_ah;
+  NoiseModel noise{.white_v = shared.white_v, .fast_v = shared.fast_v, .slow_v = shared.slow_v};
+  Around best;
+  for (const Unknowns& from : {Unknowns(Unknowns::Zero()), starting_point(p)}) {
+    const Around first = fit_from(p, from, wide, noise);
+    Around found = fit_from(p, first.u, wide, noise_of(p, first));
+    if (found.cost < best.cost) best = std::move(found);
+  }
+  noise = best.noise;
+  s.finding = judge(p, best);
+  if (!s.finding) best = fit_from(p, best.u, p.healthy, noise);
+  s.soc = course_of(p, best.u).soc;
+  s.resistance_factor = factor_of(p, best.u, s.soc);
+  s.offset_a = best.u[sensor_offset];
+  s.offset_sigma_a =
+      finding_for(best, p.healthy,
+                  {sensor_offset, Cause::current_offset, shared.fault_offset_c * track.capacity_ah, 0, 0})
+          .sigma;
+  s.gain = best.u[sensor_gain];
+  return s;
+}
+
+}  // namespace bms::diagnosis::pack

@@ -1,0 +1,35 @@
+// What all cells share: the state of charge over the recording, and the errors of the current sensor.
+//
+// The mean of the usual cells is a better voltmeter than one channel. Over the recording it is compared with the cell
+// file; the errors of the current sensor are unknowns next to those of the cell file:
+//
+//   v(t) = OCV(z) + (1 + resistance) (R0(z) I + v_rc) + polarisation v_rc + level + waves of the OCV and of R0
+//   I = (1 - gain) I_read - offset          z(t) = start + (1 + capacity) integral of I / Q
+//
+// An offset changes the charge by the same amount every hour, a gain and a capacity by the charge that has passed. Only
+// an offset and a gain are named; a capacity of all cells is what they could also be.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "diagnosis/pack/pack_recording.hpp"
+#include "diagnosis/pack/pack_verdict.hpp"
+#include "diagnosis/pack/track.hpp"
+
+namespace bms::diagnosis::pack {
+
+struct SharedState {
+  std::string not_tested;                 ///< why; empty: tested
+  std::vector<double> soc;                ///< by row, of the mean of the cells
+  std::vector<double> resistance_factor;  ///< by row, on R0 and R1 of the cell file: temperature, age
+  double offset_a = 0, gain = 0;          ///< of the current sensor, most probable
+  double offset_sigma_a = 0;              ///< standard deviation
+  std::optional<PackFinding> finding;     ///< of the current sensor
+};
+
+/// track: with neighbours_v.
+SharedState shared_state_of(const Track& track, const PackRecording& pack);
+
+}  // namespace bms::diagnosis::pack
