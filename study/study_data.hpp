@@ -64,8 +64,6 @@ class PlantRuns {
     if (!run) run = std::make_shared<const std::vector<Row>>(compute());
     return run;
   }
-  std::size_t size() const { return runs_.size(); }
-  void clear() { runs_.clear(); }
 
  private:
   std::map<std::pair<std::string, std::vector<double>>, Run> runs_;
