@@ -10,7 +10,7 @@
 
 #include <ceres/jet.h>
 
-#include "model/one_rc.hpp"
+#include "identification/discretiser.hpp"
 
 namespace bms::identification {
 
@@ -257,8 +257,8 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
     by[column * n + static_cast<Eigen::Index>(b.below)] += derivative * (1 - b.weight_above);
     by[column * n + static_cast<Eigen::Index>(b.above)] += derivative * b.weight_above;
   };
-
   std::uint8_t interval = 0;
+  Discretiser<S> discretiser(n > 1);
   for (std::size_t k = 0; k < data.size(); ++k) {
     const double duration_s = k == 0 ? 0 : data.time_s[k] - data.time_s[k - 1];
     const double current_a = std::isfinite(data.current_a[k]) ? data.current_a[k] : 0;
@@ -270,8 +270,7 @@ bool GreyBox::run(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::Vec
     if constexpr (with_derivatives) around = between(options_.soc_nodes, soc);
 
     if (duration_s > 0) {
-      const S state =
-          Model::advance({local<S>(v_rc_v, by_v_rc)}, at, Model::discretise(at, input.duration_s), input)[0];
+      const S state = Model::advance({local<S>(v_rc_v, by_v_rc)}, at, discretiser.of(at, duration_s), input)[0];
       v_rc_v = value_of(state);
       if constexpr (with_derivatives) {
         v_rc_by *= state.v[by_v_rc];

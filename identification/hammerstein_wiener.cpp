@@ -1,6 +1,7 @@
 #include "identification/hammerstein_wiener.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <random>
@@ -29,14 +30,35 @@ double ramp(double x) {
 }
 double ramp_slope(double x) { return std::clamp((x + 1) / 2, 0.0, 1.0); }
 
-/// Straight-line basis: corner k of n as a sum of ramps.
-double corner_weight(double at, std::size_t k, std::size_t last, double (*basis)(double), double width) {
-  const auto bend = [&](std::size_t corner) { return basis((at - static_cast<double>(corner)) / width); };
-  double weight = 0;
-  // second differences of the corners are the changes of slope at the inner corners
-  if (k >= 2) weight += bend(k - 1);
-  if (k >= 1 && k < last) weight -= 2 * bend(k);
-  if (k + 2 <= last) weight += bend(k + 1);
+/// A rounded ramp, or its slope, from every inner corner.
+class Bends {
+ public:
+  /// at: in pieces from the first of `corners` corners.
+  template <class Basis>
+  Bends(double at, std::size_t corners, const Basis& basis) : last_(corners - 1) {
+    for (std::size_t k = 1; k < last_; ++k) bend_[k] = basis((at - static_cast<double>(k)) / rounded_part);
+  }
+
+  /// Straight-line basis: corner k as a sum of ramps.
+  double weight(std::size_t k) const {
+    double weight = 0;
+    // second differences of the corners are the changes of slope at the inner corners
+    if (k >= 2) weight += bend_[k - 1];
+    if (k >= 1 && k < last_) weight -= 2 * bend_[k];
+    if (k + 2 <= last_) weight += bend_[k + 1];
+    return weight;
+  }
+
+ private:
+  std::size_t last_;
+  std::array<double, pieces + 1> bend_{};
+};
+
+/// Weight of corner k in the curve.
+double corner_weight(const Bends& ramps, double at, std::size_t k) {
+  double weight = rounded_part * ramps.weight(k);
+  if (k == 0) weight += 1 - at;  // the line through the first two corners
+  if (k == 1) weight += at;
   return weight;
 }
 
@@ -91,8 +113,10 @@ void add_samples(const Problem& p, const HammersteinWiener& m, VectorXd& r, Eige
     jacobian->row(k).head(first) = slope * by_linear.row(k);
     (*jacobian)(k, first) = slope * by_direction[k];
     (*jacobian)(k, first + 1) = slope * by_growth[k];
+    const double at = (w[k] - m.output.w_from_v) / m.output.w_step_v;
+    const Bends ramps(at, pieces + 1, ramp);
     for (std::size_t c = 1; c < pieces; ++c)
-      (*jacobian)(k, first + 1 + static_cast<Index>(c)) = m.output.by_corner(w[k], c);
+      (*jacobian)(k, first + 1 + static_cast<Index>(c)) = corner_weight(ramps, at, c);
   }
 }
 
@@ -123,26 +147,23 @@ std::vector<double> InputCurve::through(std::span<const double> current_a) const
 
 double OutputCurve::by_corner(double w_v, std::size_t k) const {
   const double at = (w_v - w_from_v) / w_step_v;
-  const std::size_t last = y_v.size() - 1;
-  double weight = rounded_part * corner_weight(at, k, last, ramp, rounded_part);
-  if (k == 0) weight += 1 - at;  // the line through the first two corners
-  if (k == 1) weight += at;
-  return weight;
+  return corner_weight(Bends(at, y_v.size(), ramp), at, k);
 }
 
 double OutputCurve::through(double w_v) const {
   if (y_v.empty()) return w_v;
+  const double at = (w_v - w_from_v) / w_step_v;
+  const Bends ramps(at, y_v.size(), ramp);
   double y = 0;
-  for (std::size_t k = 0; k < y_v.size(); ++k) y += y_v[k] * by_corner(w_v, k);
+  for (std::size_t k = 0; k < y_v.size(); ++k) y += y_v[k] * corner_weight(ramps, at, k);
   return y;
 }
 
 double OutputCurve::slope(double w_v) const {
   if (y_v.empty()) return 1;
-  const double at = (w_v - w_from_v) / w_step_v;
+  const Bends slopes((w_v - w_from_v) / w_step_v, y_v.size(), ramp_slope);
   double slope = y_v[1] - y_v[0];
-  for (std::size_t k = 0; k < y_v.size(); ++k)
-    slope += y_v[k] * corner_weight(at, k, y_v.size() - 1, ramp_slope, rounded_part);
+  for (std::size_t k = 0; k < y_v.size(); ++k) slope += y_v[k] * slopes.weight(k);
   return slope / w_step_v;
 }
 

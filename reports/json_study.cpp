@@ -24,7 +24,7 @@ Json held_out_of(const study::HeldOut& h) {
           {"from", h.from},
           {"rank_correlation", optional(h.rank_correlation)},
           {"median_gap_points", optional(h.median_gap_points)},
-          {"typical_ratio", h.typical_ratio}};
+          {"typical_ratio", h.typical_ratio > 0 ? Json(h.typical_ratio) : Json(nullptr)}};
 }
 
 Json match_of(const study::Table7Match& m) {

@@ -14,7 +14,6 @@ namespace bms::study {
 
 namespace {
 
-constexpr int screening_points = 10, iterations = 8, refit_iterations = 5;
 constexpr double z = 1.959964;  // 95 %
 using Clock = std::chrono::steady_clock;
 
@@ -60,63 +59,68 @@ struct Fitted {
   CandidateFit summary;
 };
 
-Fitted fitted(const model::CellParameters<>& cell, const Effects& effects) {
-  const PaperFit fit(cell, effects);
+Fitted fitted(const model::CellParameters<>& cell, const Effects& effects, const PaperDiagnosisOptions& options) {
+  const PaperFit fit(cell, effects, options.published);
   Fitted out{effects, {}, {}, {}};
-  out.x = fit.fit(fit.screened(screening_points), std::vector<bool>(fit.published().size(), true), iterations);
+  const std::vector<bool> all(fit.published().size(), true);
+  out.x = fit.fit(fit.start(), all, options.iterations);
   out.simulated = fit.simulate(out.x);
   out.summary = {effects, fit.unknowns().size(), fit.score(out.simulated), 0, match_of(out.simulated, fit.published())};
   return out;
 }
 
-/// A part of the figures that a refit does not see.
+/// A part of the figures that a refit does not see, and the tables that it predicts.
 struct Split {
-  std::string table, from;
+  std::vector<std::string> tables;
+  std::string from;
   std::vector<bool> used;
 };
 
 std::vector<Split> splits_of(const std::vector<Figure>& published) {
   std::vector<Split> all;
+  const auto using_groups = [&](const auto& accepts) {
+    std::vector<bool> used;
+    for (const Figure& f : published) used.push_back(accepts(f.group));
+    return used;
+  };
   for (std::size_t g = 0; g < figure_group_names.size(); ++g) {
-    Split one{figure_group_names[g], "all other tables", {}};
-    for (const Figure& f : published) one.used.push_back(static_cast<std::size_t>(f.group) != g);
-    all.push_back(std::move(one));
+    const auto other = [&](FigureGroup group) { return static_cast<std::size_t>(group) != g; };
+    all.push_back({{figure_group_names[g]}, "all other tables", using_groups(other)});
   }
   for (const std::size_t parity : {0U, 1U}) {
-    Split half{fmt::format("7, {} cells", parity == 0 ? "even" : "odd"), "its other cells and all other figures", {}};
+    Split half{{fmt::format("7, {} cells", parity == 0 ? "even" : "odd")}, "its other cells and all other figures", {}};
     for (std::size_t k = 0; k < published.size(); ++k)
       half.used.push_back(published[k].group != FigureGroup::table7 || k % 2 != parity);
     all.push_back(std::move(half));
   }
-  for (const FigureGroup predicted : {FigureGroup::table8, FigureGroup::table6}) {
-    Split from_7{figure_group_names[static_cast<std::size_t>(predicted)], "Table 7 alone", {}};
-    for (const Figure& f : published) from_7.used.push_back(f.group == FigureGroup::table7);
-    all.push_back(std::move(from_7));
-  }
-  Split to_7{"7", "Tables 6 and 8 alone", {}};
-  for (const Figure& f : published)
-    to_7.used.push_back(f.group == FigureGroup::table8 || f.group == FigureGroup::table6);
-  all.push_back(std::move(to_7));
+  Split off_diagonal{{"7, off the diagonal"}, "its diagonal and all other tables", {}};
+  for (std::size_t k = 0; k < published.size(); ++k)
+    off_diagonal.used.push_back(published[k].group != FigureGroup::table7 ||
+                                k / paper_experiments == k % paper_experiments);
+  all.push_back(std::move(off_diagonal));
+  all.push_back({{"8", "6"}, "Table 7 alone", using_groups([](FigureGroup g) { return g == FigureGroup::table7; })});
+  all.push_back({{"7"}, "Tables 6 and 8 alone", using_groups([](FigureGroup g) {
+                   return g == FigureGroup::table8 || g == FigureGroup::table6;
+                 })});
   return all;
 }
 
-/// Is this figure judged by the split? Of "8" from Table 7 only Table 8.
-bool judged_by(const Split& split, const Figure& f, std::size_t k) {
-  return !split.used[k] && split.table.substr(0, 1) == figure_group_names[static_cast<std::size_t>(f.group)];
+/// Is this figure of the table, and not used by the fit?
+bool judged_by(const std::string& table, const Split& split, const Figure& f, std::size_t k) {
+  return !split.used[k] && table.substr(0, 1) == figure_group_names[static_cast<std::size_t>(f.group)];
 }
 
-HeldOut held_out(const PaperFit& fit, const Eigen::VectorXd& from, const Split& split) {
-  const std::vector<Figure>& published = fit.published();
-  const std::vector<Figure> simulated = fit.simulate(fit.fit(from, split.used, refit_iterations));
+HeldOut held_out(const std::vector<Figure>& simulated, const std::vector<Figure>& published, const std::string& table,
+                 const Split& split) {
   const std::vector<double> d = differences(simulated, published);
-  HeldOut out{split.table, split.from, std::nullopt, std::nullopt, 0};
+  HeldOut out{table, split.from, std::nullopt, std::nullopt, 0};
   constexpr std::size_t table8_columns = 4;
   std::vector<std::vector<double>> a(table8_columns), b(table8_columns);
   std::vector<double> gaps;
   double squares = 0, count = 0;
   for (std::size_t k = 0; k < published.size(); ++k) {
     const Figure& f = published[k];
-    if (!judged_by(split, f, k)) continue;
+    if (!judged_by(table, split, f, k)) continue;
     squares += d[k] * d[k];
     ++count;
     if (f.is_fit) gaps.push_back(std::abs(simulated[k].value - f.value));
@@ -138,12 +142,26 @@ HeldOut held_out(const PaperFit& fit, const Eigen::VectorXd& from, const Split& 
   return out;
 }
 
-/// Each refit begins at the start values, not at the optimum of all figures, which would know what is left out.
-std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Effects& effects) {
-  const PaperFit fit(cell, effects);
+/// Each refit searches from the beginning: the optimum of all figures would know what is left out.
+/// only_table7: rows of other tables stay empty.
+std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Effects& effects,
+                                  const PaperDiagnosisOptions& options, bool only_table7) {
+  const PaperFit fit(cell, effects, options.published);
   const std::vector<Split> splits = splits_of(fit.published());
-  std::vector<HeldOut> out(splits.size());
-  measurement::in_parallel(splits.size(), [&](std::size_t k) { out[k] = held_out(fit, fit.start(), splits[k]); });
+  std::vector<std::vector<Figure>> simulated(splits.size());
+  measurement::in_parallel(splits.size(), [&](std::size_t k) {
+    const std::vector<bool>& used = splits[k].used;
+    if (only_table7 && !splits[k].tables.front().starts_with("7")) return;
+    const bool without_table7 = !used.front() && !used[1];
+    simulated[k] = fit.simulate(fit.searched(used, without_table7 ? options.screening_points : 0, options.iterations));
+  });
+  std::vector<HeldOut> out;
+  for (std::size_t k = 0; k < splits.size(); ++k) {
+    for (const std::string& table : splits[k].tables) {
+      out.push_back(simulated[k].empty() ? HeldOut{table, splits[k].from, std::nullopt, std::nullopt, 0}
+                                         : held_out(simulated[k], fit.published(), table, splits[k]));
+    }
+  }
   return out;
 }
 
@@ -191,7 +209,8 @@ std::string Effects::name() const {
   add(hysteresis, "hysteresis");
   add(slow_polarisation, "a slow polarisation");
   add(other_ocv, "another OCV than its model (Tables 1 and 9 differ)");
-  return text.empty() ? "no effect beyond the equations of the paper" : text;
+  if (text.empty()) text = "no effect beyond the equations of the paper";
+  return text + (whole_ocv ? "; models that know the OCV over the whole range" : "");
 }
 
 double rank_correlation(const std::vector<double>& a, const std::vector<double>& b) {
@@ -207,14 +226,16 @@ double rank_correlation(const std::vector<double>& a, const std::vector<double>&
   return xx > 0 && yy > 0 ? xy / std::sqrt(xx * yy) : 0;
 }
 
-PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell) {
+std::vector<Effects> all_effects() {
+  constexpr Effects none, hysteresis{true, false, false, false}, slow{false, true, false, false},
+      both{true, true, false, false}, slow_and_ocv{false, true, true, false};
+  return {both, slow_and_ocv, slow, hysteresis, none, {true, true, false, true}, {false, false, false, true}};
+}
+
+PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDiagnosisOptions& options) {
   const auto begin = Clock::now();
-  constexpr std::size_t count = 8;
-  std::vector<Fitted> all(count);
-  measurement::in_parallel(count, [&](std::size_t k) {
-    const std::size_t bits = count - 1 - k;  // the candidates with most unknowns first
-    all[k] = fitted(cell, {(bits & 1U) != 0, (bits & 2U) != 0, (bits & 4U) != 0});
-  });
+  std::vector<Fitted> all(options.candidates.size());
+  measurement::in_parallel(all.size(), [&](std::size_t k) { all[k] = fitted(cell, options.candidates[k], options); });
   std::sort(all.begin(), all.end(), [](const Fitted& a, const Fitted& b) { return a.summary.score < b.summary.score; });
   PaperDiagnosis d;
   double sum = 0;
@@ -223,11 +244,13 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell) {
   for (Fitted& f : all) {
     f.summary.weight = std::exp(all.front().summary.score - f.summary.score) / sum;
     d.candidates.push_back(f.summary);
-    if (!f.effects.hysteresis && !f.effects.slow_polarisation && !f.effects.other_ocv) plain = &f;
+    if (!f.effects.hysteresis && !f.effects.slow_polarisation && !f.effects.other_ocv && !f.effects.whole_ocv)
+      plain = &f;
   }
+  if (plain == nullptr) throw std::invalid_argument("no candidate without effects");
   d.plain = plain->summary;
   const Fitted& best = all.front();
-  const PaperFit fit(cell, best.effects);
+  const PaperFit fit(cell, best.effects, options.published);
   const Eigen::VectorXd deviation = fit.deviation(best.x);
   for (std::size_t k = 0; k < fit.unknowns().size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
@@ -235,8 +258,10 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell) {
     d.physics.push_back({u.id, std::exp(best.x[at]), std::max(u.low, std::exp(best.x[at] - z * deviation[at])),
                          std::min(u.high, std::exp(best.x[at] + z * deviation[at])), u.unit});
   }
-  d.held_out = all_held_out(cell, best.effects);
-  d.held_out_plain = all_held_out(cell, plain->effects);
+  if (options.hold_out) {
+    d.held_out = all_held_out(cell, best.effects, options, false);
+    d.held_out_plain = all_held_out(cell, plain->effects, options, true);
+  }
   d.simulated = best.simulated;
   d.contradictions = contradictions_of(best.simulated, fit.published());
   d.statement = statement_of(d);

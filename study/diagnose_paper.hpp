@@ -14,6 +14,7 @@ namespace bms::study {
 /// Effects that a candidate may have.
 struct Effects {
   bool hysteresis = false, slow_polarisation = false, other_ocv = false;
+  bool whole_ocv = false;  ///< the models of Tables 7 and 8 know the OCV over the whole range, not as a line at 40 %
   std::string name() const;
 };
 
@@ -59,14 +60,24 @@ struct PaperDiagnosis {
   std::vector<PaperPhysics> physics;     ///< of the best
   CandidateFit plain;                    ///< the equations of the paper alone
   std::vector<HeldOut> held_out;
-  std::vector<HeldOut> held_out_plain;  ///< the same predictions by the equations of the paper alone
+  std::vector<HeldOut> held_out_plain;  ///< those of Table 7 by the equations of the paper alone; the others are empty
   std::vector<Contradiction> contradictions;
   std::vector<Figure> simulated;  ///< by the best candidate, in the order of published_figures()
   std::string statement;          ///< for the reader
   double seconds = 0;
 };
 
-PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell);
+/// Effects of every candidate.
+std::vector<Effects> all_effects();
+
+struct PaperDiagnosisOptions {
+  std::vector<Figure> published = published_figures();
+  std::vector<Effects> candidates = all_effects();  ///< the one without effects among them
+  int iterations = 8;
+  int screening_points = 24;  ///< for a second search where all of Table 7 is left out: then there are several minima
+  bool hold_out = true;       ///< predict figures that a fit did not use
+};
+PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDiagnosisOptions& options = {});
 
 /// Tables of the page.
 std::vector<files::PageTable> tables_of(const PaperDiagnosis& diagnosis);

@@ -1,5 +1,6 @@
 // Tables of the diagnosis of the paper.
 #include "study/diagnose_paper.hpp"
+#include "study/paper_consistency.hpp"
 #include "study/table_cells.hpp"
 
 namespace bms::study {
@@ -44,13 +45,14 @@ files::PageTable held_out_table(const PaperDiagnosis& d) {
                          {},
                          "Table 8: mean rank correlation of its four columns. Factor: of the error of a fit, or of the "
                          "figure itself."};
-  const auto optional_cell = [](const std::optional<double>& v) { return v ? number_cell(*v) : label("few figures"); };
+  const auto optional_cell = [](const std::optional<double>& v) { return v ? number_cell(*v) : label("-"); };
   for (std::size_t k = 0; k < d.held_out.size(); ++k) {
     const HeldOut &best = d.held_out[k], &plain = d.held_out_plain[k];
     table.rows.push_back({label(best.table == "A" ? "Appendix A" : "Table " + best.table), label(best.from),
                           optional_cell(best.rank_correlation), optional_cell(plain.rank_correlation),
                           optional_cell(best.median_gap_points), optional_cell(plain.median_gap_points),
-                          number_cell(best.typical_ratio), number_cell(plain.typical_ratio)});
+                          number_cell(best.typical_ratio),
+                          optional_cell(plain.typical_ratio > 0 ? std::optional(plain.typical_ratio) : std::nullopt)});
   }
   return table;
 }
@@ -76,10 +78,22 @@ files::PageTable contradiction_table(const PaperDiagnosis& d) {
   return table;
 }
 
+files::PageTable consistency_table() {
+  files::PageTable table{"consistency",
+                         "Published figures that contradict each other, or the text",
+                         {"figures", "they say", "meaning"},
+                         {},
+                         "From the published figures alone, without a simulation."};
+  for (const Inconsistency& i : inconsistencies())
+    table.rows.push_back({label(i.figures), label(i.observed), label(i.meaning)});
+  return table;
+}
+
 }  // namespace
 
 std::vector<files::PageTable> tables_of(const PaperDiagnosis& d) {
-  return {physics_table(d), candidate_table(d), held_out_table(d), table7(d), contradiction_table(d)};
+  return {consistency_table(), physics_table(d), candidate_table(d),
+          held_out_table(d),   table7(d),        contradiction_table(d)};
 }
 
 }  // namespace bms::study

@@ -12,6 +12,15 @@ namespace {
 constexpr double pulse_start_soc = 0.41;
 constexpr int paper_ocv_steps = 10, fine_ocv_steps = 40;
 
+/// The current acts one sample earlier, which cancels a delay of one sample. The last sample has no current.
+StudyData one_sample_early(const StudyData& part) {
+  StudyData early = part;
+  const id::Data& d = part.data;
+  const std::size_t count = d.size() - 1;
+  early.data = {d.time_s.part(0, count), d.current_a.part(1, count), d.voltage_v.part(0, count), d.capacity_ah};
+  return early;
+}
+
 OcvObservation observe_ocv(const std::vector<id::RestedVoltage>& rests) {
   const id::OcvPoints all = points_of(rests, id::OcvDirection::discharge);
   // look-up and pieces have entries at every second and every fourth rest; the rests between them judge
@@ -119,6 +128,20 @@ InitialStates initial_states(const model::CellParameters<>& cell, const StudyDat
   return {found.x[1], found.x[0], id::fit_of(part.data.voltage_v, simulated, part.data.current_a, 0).fit_percent};
 }
 
+WithoutDelay observe_without_delay(Fitter& fitter, const StudyData& estimation, const StudyData& validation) {
+  constexpr std::size_t output_error_model = 1;
+  WithoutDelay out;
+  const StudyData early = one_sample_early(estimation), early_validation = one_sample_early(validation);
+  const auto fitted = [&](std::size_t model) -> std::optional<ModelObservation> {
+    const ModelFit fit = fitter.fit(model, early, id::Method::trust_region_reflective, early_validation);
+    if (!fit.usable) out.why_not = fit.why_not;
+    return fit.usable ? std::optional(observation_of(fit)) : std::nullopt;
+  };
+  out.output_error = fitted(output_error_model);
+  out.hammerstein_wiener = fitted(hammerstein_wiener_model);
+  return out;
+}
+
 void observe_models(Fitter& fitter, const StudyData& estimation, const StudyData& validation, Observations& out) {
   for (std::size_t k = 0; k < models; ++k) {
     for (std::size_t m = 0; m < methods.size(); ++m) {
@@ -132,12 +155,14 @@ void observe_models(Fitter& fitter, const StudyData& estimation, const StudyData
         out.model[k] = observation_of(fit);
     }
   }
+  out.without_delay = observe_without_delay(fitter, estimation, validation);
 }
 
-Observations observe_bench(const model::CellParameters<>& cell, const Bench& bench, std::uint64_t seed) {
+Observations observe_bench(const model::CellParameters<>& cell, const Bench& bench, std::uint64_t seed,
+                           PlantRuns& runs) {
   Observations out;
-  const StudyData test = run_ocv_test(paper_ocv_steps, bench, seed, false);
-  const StudyData fine = run_ocv_test(fine_ocv_steps, bench, seed + 1, false);
+  const StudyData test = run_ocv_test(paper_ocv_steps, bench, seed, false, &runs);
+  const StudyData fine = run_ocv_test(fine_ocv_steps, bench, seed + 1, false, &runs);
   const std::vector<id::RestedVoltage> rests = id::rested_voltages(test.data, 1);
   out.ocv = observe_ocv(id::rested_voltages(fine.data, 1));
   Fitter fitter(cell, 0, {});
@@ -148,8 +173,9 @@ Observations observe_bench(const model::CellParameters<>& cell, const Bench& ben
 
   std::vector<StudyData> parts;
   for (std::size_t k = 0; k < ocv_experiment; ++k)
-    parts.push_back(run_on_bench(experiment_names[k], pulse_start_soc, bench, seed + 2 + k));
-  const StudyData hour = run_on_bench(experiment_names[ocv_experiment], 1, bench, seed + 2 + ocv_experiment, 0.29);
+    parts.push_back(run_on_bench(experiment_names[k], pulse_start_soc, bench, seed + 2 + k, -1, &runs));
+  const StudyData hour =
+      run_on_bench(experiment_names[ocv_experiment], 1, bench, seed + 2 + ocv_experiment, 0.29, &runs);
   parts.push_back(window(hour, "ocv_1h_rest, 50 to 30 %", 0.5, 0.3));
   out.cross = observe_cross(fitter, parts);
 

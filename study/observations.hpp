@@ -44,11 +44,20 @@ struct OcvObservation {
   double look_up_v = 0, polynomial_v = 0, pieces_v = 0;
 };
 
+/// Output error and Hammerstein-Wiener without the delay of Eq. 18: the current of the same sample acts on the voltage.
+/// This is so if the paper logged each current one sample before its voltage, and it may explain the order of the
+/// models.
+struct WithoutDelay {
+  std::optional<ModelObservation> output_error, hammerstein_wiener;
+  std::string why_not;
+};
+
 struct Observations {
   /// Fit to estimation data by optimiser and model, from the paper's start.
   std::array<std::array<std::optional<double>, models>, methods.size()> table4;
   std::array<std::optional<ModelObservation>, models> model;
   std::array<std::string, models> no_model;  ///< the reason
+  WithoutDelay without_delay;
   std::optional<CrossObservation> cross;
   std::optional<InitialSocObservation> initial_soc;
   std::optional<OcvObservation> ocv;
@@ -56,11 +65,14 @@ struct Observations {
 };
 
 /// The paper's whole procedure on one simulated cell. The models receive the OCV that the paper's test gives of it: the
-/// rested voltages after discharge pulses. seed: of the noise.
-Observations observe_bench(const model::CellParameters<>& cell, const Bench& bench, std::uint64_t seed);
+/// rested voltages after discharge pulses. seed: of the noise. runs: shared by benches that differ in what is left out.
+Observations observe_bench(const model::CellParameters<>& cell, const Bench& bench, std::uint64_t seed,
+                           PlantRuns& runs);
 
 /// Every model with every optimiser on two data sets.
 void observe_models(Fitter& fitter, const StudyData& estimation, const StudyData& validation, Observations& out);
+
+WithoutDelay observe_without_delay(Fitter& fitter, const StudyData& estimation, const StudyData& validation);
 
 ModelObservation observation_of(const ModelFit& fit);
 /// The fits of a grey box identified from each of the seven experiments, on all of them.

@@ -23,21 +23,38 @@ struct Figure {
   std::string name;
   double value = 0;
   bool is_fit = false;  ///< percent; compared as the logarithm of 100 - fit, the relative error
-  bool scaled = false;  ///< compared only up to a common factor
+  /// Compared only up to a factor that all figures of this number share: number and rate of samples are not published.
+  int scale = 0;  ///< 0: compared as it is
 };
 
 /// In the same order as figures_of().
 std::vector<Figure> published_figures();
 
+/// Currents of the six pulse designs, which the paper does not publish. The sizes of the voltage in Tables 7 and 8
+/// (paper_consistency.hpp) are those of a current with two levels, which is the same step in all six.
+struct PulseDesigns {
+  double pulse_s = 20;  ///< of the designs with rests
+  double pulse_c_rate = 0.7;
+  double high_c_rate = 0.7;  ///< discharge
+  double swing = 1.2;        ///< LOW is HIGH (1 - swing): above 1 it charges
+  double duration_s = 1'200;
+};
+
 /// A bench and the OCV that the models are given.
 struct PaperCandidate {
+  PulseDesigns pulses;
   Bench bench;
+  /// The models of Tables 7 and 8 know the OCV over the whole range; otherwise only b0 and b1 of 40 %, as a line.
+  bool whole_ocv = false;
   bool other_ocv = false;  ///< the models use Table 1 although the cell has Table 9
+  /// Tables 7 and 8 use this part of the OCV test on either side of 40 %. The paper does not state it.
+  double ocv_half_window = 0.1;
+  std::uint64_t seed = 1;  ///< of the noise
 };
-std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate);
+std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate, PlantRuns& runs);
 
-/// Differences as the fit sees them: logarithm of simulated over published, limited to +-2. Figures that are compared
-/// up to a factor are shifted to mean 0 first.
+/// Differences as the fit sees them: logarithm of simulated over published, limited to +-2. Figures that share a factor
+/// are shifted to mean 0 first.
 std::vector<double> differences(const std::vector<Figure>& simulated, const std::vector<Figure>& published);
 
 }  // namespace bms::study

@@ -10,6 +10,7 @@ namespace bms::study {
 namespace {
 
 constexpr double difference_step = 0.05;  // of a logarithm
+constexpr double screened_range = 0.7;    // of a logarithm, on either side of the start
 /// Differences that count as one standard deviation, by group: as large as those between two such experiments.
 constexpr std::array<double, 5> expected_difference = {0.3, 0.6, 0.5, 0.3, 0.5};
 
@@ -31,16 +32,24 @@ double spread(int index, int base) {
 
 }  // namespace
 
-PaperFit::PaperFit(const model::CellParameters<>& cell, const Effects& effects)
-    : cell_(cell), effects_(effects), published_(published_figures()) {
-  unknowns_ = {{"short_pulse_c_rate", "C", 0.7, 0.1, 1, nullptr, &Bench::short_c_rate},
-               {"burst_c_rate", "C", 0.6, 0.1, 1, nullptr, &Bench::long_c_rate},
-               {"ocv_test_c_rate", "C", 0.8, 0.1, 1, nullptr, &Bench::ocv_c_rate},
-               {"voltage_noise_v", "V", 0.001, 1e-4, 0.01, nullptr, &Bench::voltage_noise_v}};
-  if (effects.hysteresis) unknowns_.push_back({"half_gap_v", "V", 0.01, 5e-4, 0.04, &LeftOut::half_gap_v, nullptr});
+PaperFit::PaperFit(const model::CellParameters<>& cell, const Effects& effects, std::vector<Figure> published)
+    : cell_(cell), effects_(effects), published_(std::move(published)) {
+  using C = PaperCandidate;
+  unknowns_ = {{"pulse_c_rate", "C", 0.7, 0.1, 1, [](C& c, double v) { c.pulses.pulse_c_rate = v; }},
+               {"pulse_s", "s", 20, 5, 60, [](C& c, double v) { c.pulses.pulse_s = v; }},
+               {"high_c_rate", "C", 0.6, 0.1, 1, [](C& c, double v) { c.pulses.high_c_rate = v; }},
+               {"swing", "of HIGH", 1.2, 0.2, 2, [](C& c, double v) { c.pulses.swing = v; }},
+               {"duration_s", "s", 900, 300, 3'600, [](C& c, double v) { c.pulses.duration_s = v; }},
+               {"ocv_test_c_rate", "C", 0.8, 0.1, 1, [](C& c, double v) { c.bench.ocv_c_rate = v; }},
+               {"ocv_half_window", "of SOC", 0.35, 0.05, 0.4, [](C& c, double v) { c.ocv_half_window = v; }},
+               {"voltage_noise_v", "V", 0.001, 1e-4, 0.01, [](C& c, double v) { c.bench.voltage_noise_v = v; }}};
+  if (effects.hysteresis)
+    unknowns_.push_back({"half_gap_v", "V", 0.01, 5e-4, 0.04, [](C& c, double v) { c.bench.left_out.half_gap_v = v; }});
   if (effects.slow_polarisation) {
-    unknowns_.push_back({"slow_resistance_ohm", "ohm", 0.008, 5e-4, 0.06, &LeftOut::slow_ohm, nullptr});
-    unknowns_.push_back({"slow_time_constant_s", "s", 600, 60, 20'000, &LeftOut::slow_s, nullptr});
+    unknowns_.push_back(
+        {"slow_resistance_ohm", "ohm", 0.008, 5e-4, 0.06, [](C& c, double v) { c.bench.left_out.slow_ohm = v; }});
+    unknowns_.push_back(
+        {"slow_time_constant_s", "s", 600, 60, 20'000, [](C& c, double v) { c.bench.left_out.slow_s = v; }});
   }
 }
 
@@ -51,17 +60,21 @@ Eigen::VectorXd PaperFit::start() const {
 }
 
 std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x) const {
+  PlantRuns runs;
+  return simulate(x, runs);
+}
+
+std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x, PlantRuns& runs) const {
   constexpr double ocv_step_s = 5;
   PaperCandidate candidate;
   candidate.other_ocv = effects_.other_ocv;
+  candidate.whole_ocv = effects_.whole_ocv;
   candidate.bench.start_branch = -1;  // 40 % is reached by discharge
   candidate.bench.ocv_step_s = ocv_step_s;
   for (std::size_t k = 0; k < unknowns_.size(); ++k) {
-    const double value = std::exp(x[static_cast<Eigen::Index>(k)]);
-    if (unknowns_[k].of_bench != nullptr) candidate.bench.*unknowns_[k].of_bench = value;
-    if (unknowns_[k].of_cell != nullptr) candidate.bench.left_out.*unknowns_[k].of_cell = value;
+    unknowns_[k].set(candidate, std::exp(x[static_cast<Eigen::Index>(k)]));
   }
-  return figures_of(cell_, candidate);
+  return figures_of(cell_, candidate, runs);
 }
 
 Eigen::VectorXd PaperFit::weighted(const std::vector<Figure>& simulated, const std::vector<bool>& used) const {
@@ -86,7 +99,8 @@ id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
     p.upper[k] = std::log(unknowns_[static_cast<std::size_t>(k)].high);
   }
   p.evaluate = [this, used](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    r = weighted(simulate(x), used);
+    PlantRuns runs;  // the columns of the Jacobian share most of them
+    r = weighted(simulate(x, runs), used);
     if (jacobian == nullptr) return r.allFinite();
     jacobian->resize(r.size(), x.size());
     for (Eigen::Index k = 0; k < x.size(); ++k) {
@@ -94,26 +108,25 @@ id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
       const double step = x[k] + difference_step > top ? -difference_step : difference_step;
       Eigen::VectorXd moved = x;
       moved[k] += step;
-      jacobian->col(k) = (weighted(simulate(moved), used) - r) / step;
+      jacobian->col(k) = (weighted(simulate(moved, runs), used) - r) / step;
     }
     return r.allFinite() && jacobian->allFinite();
   };
   return p;
 }
 
-Eigen::VectorXd PaperFit::screened(int points) const {
-  constexpr std::array primes = {2, 3, 5, 7, 11, 13, 17};
-  const std::vector<bool> all(published_.size(), true);
+Eigen::VectorXd PaperFit::screened(int points, const std::vector<bool>& used) const {
+  constexpr std::array primes = {2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31};
   Eigen::VectorXd best = start();
-  double least = weighted(simulate(best), all).squaredNorm();
+  double least = INFINITY;  // the start is searched anyway
   for (int point = 1; point <= points; ++point) {
     Eigen::VectorXd x = best;
     for (Eigen::Index k = 0; k < x.size(); ++k) {
       const PaperUnknown& u = unknowns_[static_cast<std::size_t>(k)];
-      const double part = spread(point, primes[static_cast<std::size_t>(k)]);
-      x[k] = std::log(u.low) + part * (std::log(u.high) - std::log(u.low));
+      const double part = 2 * spread(point, primes[static_cast<std::size_t>(k)]) - 1;
+      x[k] = std::clamp(std::log(u.start) + part * screened_range, std::log(u.low), std::log(u.high));
     }
-    const double squares = weighted(simulate(x), all).squaredNorm();
+    const double squares = weighted(simulate(x), used).squaredNorm();
     if (squares >= least) continue;
     least = squares;
     best = x;
@@ -127,6 +140,14 @@ Eigen::VectorXd PaperFit::fit(const Eigen::VectorXd& from, const std::vector<boo
   stopping.cost = 1e-3;
   stopping.step = 1e-2;
   return minimise(problem(used), from, id::Method::levenberg_marquardt, stopping).x;
+}
+
+Eigen::VectorXd PaperFit::searched(const std::vector<bool>& used, int points, int iterations) const {
+  const auto squares = [&](const Eigen::VectorXd& x) { return weighted(simulate(x), used).squaredNorm(); };
+  const Eigen::VectorXd one = fit(start(), used, iterations);
+  if (points == 0) return one;
+  const Eigen::VectorXd other = fit(screened(points, used), used, iterations);
+  return squares(other) < squares(one) ? other : one;
 }
 
 Eigen::VectorXd PaperFit::deviation(const Eigen::VectorXd& x) const {

@@ -14,19 +14,23 @@ namespace bms::study {
 struct PaperUnknown {
   std::string id, unit;
   double start = 0, low = 0, high = 0;
-  double LeftOut::*of_cell = nullptr;
-  double Bench::*of_bench = nullptr;
+  void (*set)(PaperCandidate&, double) = nullptr;
 };
 
 class PaperFit {
  public:
-  PaperFit(const model::CellParameters<>& cell, const Effects& effects);
+  PaperFit(const model::CellParameters<>& cell, const Effects& effects, std::vector<Figure> published);
 
   const std::vector<PaperUnknown>& unknowns() const { return unknowns_; }
   Eigen::VectorXd start() const;
-  /// The best of a few points spread over the bounds.
-  Eigen::VectorXd screened(int points) const;
+  /// The best of a few points spread over the bounds, by the figures used.
+  Eigen::VectorXd screened(int points, const std::vector<bool>& used) const;
   std::vector<Figure> simulate(const Eigen::VectorXd& x) const;
+  /// The same with runs of the plant that other simulations may share.
+  std::vector<Figure> simulate(const Eigen::VectorXd& x, PlantRuns& runs) const;
+
+  /// The better end of searches from the start and from the best screened point. There are several minima.
+  Eigen::VectorXd searched(const std::vector<bool>& used, int points, int iterations) const;
 
   /// used: by figure, whether it counts.
   Eigen::VectorXd fit(const Eigen::VectorXd& from, const std::vector<bool>& used, int iterations) const;

@@ -214,17 +214,36 @@ Verdict of_ocv(const Observations& run, bool polynomial) {
                       1e3 * o.pieces_v)};
 }
 
+/// The four models, those with a delay replaced by those without.
+Judge without_delay(OfModels judge) {
+  return [judge = std::move(judge)](const Observations& run) -> Verdict {
+    const WithoutDelay& w = run.without_delay;
+    if (!w.output_error || !w.hammerstein_wiener) return {std::nullopt, w.why_not.empty() ? run.not_run : w.why_not};
+    Observations instead = run;
+    instead.model[oe] = w.output_error;
+    instead.model[hw] = w.hammerstein_wiener;
+    return with_models(judge)(instead);
+  };
+}
+
 constexpr auto estimation_fit = &ModelObservation::estimation_fit, validation_fit = &ModelObservation::validation_fit,
                estimation_v = &ModelObservation::estimation_rmse_v, validation_v = &ModelObservation::validation_rmse_v;
+
+Verdict hw_best(const Models& m) {
+  return {highest(m, hw, estimation_fit), four("estimation fit, %", m, estimation_fit)};
+}
+
+Verdict linear_larger(const Models& m) {
+  return {std::min(m[tf].*estimation_v, m[oe].*estimation_v) > std::max(m[hw].*estimation_v, m[grey].*estimation_v),
+          four("estimation RMSE, mV", m, estimation_v, 1e3)};
+}
 
 void add_model_judges(std::map<std::string, Judge>& all) {
   const auto add = [&](const char* id, OfModels judge) { all.emplace(id, with_models(std::move(judge))); };
   add("grey_box_best_validation", [](const Models& m) -> Verdict {
     return {highest(m, grey, validation_fit), four("validation fit, %", m, validation_fit)};
   });
-  add("hw_best_estimation", [](const Models& m) -> Verdict {
-    return {highest(m, hw, estimation_fit), four("estimation fit, %", m, estimation_fit)};
-  });
+  add("hw_best_estimation", hw_best);
   add("oe_above_tf", [](const Models& m) -> Verdict {
     return {m[oe].estimation_fit > m[tf].estimation_fit && m[oe].validation_fit > m[tf].validation_fit,
             fmt::format("{:.2f} and {:.2f} % against {:.2f} and {:.2f} %", m[oe].estimation_fit, m[oe].validation_fit,
@@ -257,10 +276,7 @@ void add_model_judges(std::map<std::string, Judge>& all) {
     return {unbiased(hw) && unbiased(grey),
             fmt::format("means {:.2f} and {:.2f} mV", 1e3 * m[hw].bias_v, 1e3 * m[grey].bias_v)};
   });
-  add("linear_larger_error", [](const Models& m) -> Verdict {
-    return {std::min(m[tf].*estimation_v, m[oe].*estimation_v) > std::max(m[hw].*estimation_v, m[grey].*estimation_v),
-            four("estimation RMSE, mV", m, estimation_v, 1e3)};
-  });
+  add("linear_larger_error", linear_larger);
   add("oe_and_grey_box_best", [](const Models& m) -> Verdict {
     return {std::max(m[oe].*validation_v, m[grey].*validation_v) < std::min(m[tf].*validation_v, m[hw].*validation_v),
             four("validation RMSE, mV", m, validation_v, 1e3)};
@@ -276,6 +292,8 @@ void add_model_judges(std::map<std::string, Judge>& all) {
 std::map<std::string, Judge> judges() {
   std::map<std::string, Judge> all;
   add_model_judges(all);
+  all.emplace("hw_best_estimation_without_delay", without_delay(hw_best));
+  all.emplace("linear_larger_error_without_delay", without_delay(linear_larger));
   all.emplace("nls_best_tf", best_optimiser(tf, trust_region));
   all.emplace("nls_best_oe", best_optimiser(oe, trust_region));
   all.emplace("lm_best_hw", best_optimiser(hw, levenberg_marquardt));

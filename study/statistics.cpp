@@ -129,13 +129,13 @@ void add_statistics(const model::CellParameters<>& cell, std::size_t seeds, std:
   // the simulated cells are the paper's, whatever cell the recordings are of
   const model::CellParameters<> paper_cell = files::read_cell("table9").parameters;
   std::vector<std::vector<Observations>> runs(names.size(), std::vector<Observations>(seeds));
-  measurement::in_parallel(names.size() * seeds, [&](std::size_t k) {
-    const std::size_t plant = k / seeds;
-    const std::uint64_t seed = first_seed + k % seeds;
+  measurement::in_parallel(seeds, [&](std::size_t k) {
     constexpr std::uint64_t noise_seed = 1'000;
-    runs[plant][k % seeds] = plant < plant_kinds.size()
-                                 ? observe_bench(paper_cell, drawn(plant_kinds[plant], seed), noise_seed * seed)
-                                 : observe_recordings(cell, recordings, seed);
+    const std::uint64_t seed = first_seed + k;
+    PlantRuns of_seed;
+    for (std::size_t plant = 0; plant < plant_kinds.size(); ++plant)
+      runs[plant][k] = observe_bench(paper_cell, drawn(plant_kinds[plant], seed), noise_seed * seed, of_seed);
+    if (recordings.size() >= 2) runs.back()[k] = observe_recordings(cell, recordings, seed);
   });
   files::PageTable table{
       "statements",

@@ -8,7 +8,10 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "identification/data.hpp"
@@ -45,17 +48,46 @@ struct Bench {
   double pulse_step_s = 1, ocv_step_s = 1;  ///< sampling
 };
 
+/// Runs of the plant by itself, without what the equations leave out and without noise. Benches that differ in nothing
+/// else share them. Not for several threads at once.
+class PlantRuns {
+ public:
+  struct Row {
+    double time_s = 0, current_a = 0, soc = 0, voltage_v = 0;
+  };
+  using Run = std::shared_ptr<const std::vector<Row>>;
+
+  /// The run of this key; computed once.
+  template <class Compute>
+  Run of(const std::string& name, const std::vector<double>& numbers, const Compute& compute) {
+    Run& run = runs_[{name, numbers}];
+    if (!run) run = std::make_shared<const std::vector<Row>>(compute());
+    return run;
+  }
+
+ private:
+  std::map<std::pair<std::string, std::vector<double>>, Run> runs_;
+};
+
 /// Runs an experiment (experiments/experiment.hpp) on the simulated cell, until its SOC falls below stop_soc.
 StudyData run_on_bench(const std::string& experiment, double soc_from, const Bench& bench, std::uint64_t seed,
-                       double stop_soc = -1);
+                       double stop_soc = -1, PlantRuns* runs = nullptr);
 
 /// An OCV test from full to empty, and back if asked for, in `steps` steps each way, with ten minutes of rest after
 /// each.
-StudyData run_ocv_test(int steps, const Bench& bench, std::uint64_t seed, bool and_back);
+StudyData run_ocv_test(int steps, const Bench& bench, std::uint64_t seed, bool and_back, PlantRuns* runs = nullptr);
 
 /// A current of one's own, sampled every second: the mean of each second.
 StudyData run_currents(const std::string& name, const std::vector<double>& current_a, double soc_from,
                        const Bench& bench, std::uint64_t seed);
+
+/// A current that alternates between two levels, between leading and trailing rests of a minute. Times need not be
+/// whole seconds.
+struct TwoLevels {
+  double first_a = 0, first_s = 0, second_a = 0, second_s = 0, duration_s = 0;
+};
+StudyData run_two_levels(const std::string& name, const TwoLevels& levels, double soc_from, const Bench& bench,
+                         std::uint64_t seed, PlantRuns& runs);
 
 /// The discharging half of an OCV test between two states of charge, counted with the nominal capacity.
 StudyData window(const StudyData& whole, const std::string& name, double high_soc, double low_soc);

@@ -8,6 +8,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
+#include "files/committed_figures.hpp"
 #include "reports/json_results.hpp"
 #include "reports/report_page.hpp"
 #include "study/diagnose_paper.hpp"
@@ -24,6 +25,7 @@ struct StudyOptions {
   std::string recordings;       ///< folder with CSV files; empty: the simulated plant
   study::StudyOptions study;
   std::string out;              ///< folder: tables as CSV, study.json, study.html
+  std::string readme;           ///< file with marks, to which the main tables are written
   bool diagnose_paper = false;  ///< instead of the study
   Output output;
 };
@@ -56,6 +58,36 @@ std::string csv_of(const files::PageTable& table) {
     csv += "\n";
   }
   return csv;
+}
+
+/// A Markdown table of the columns that `shown` accepts; the paper's values follow in brackets.
+std::string markdown_of(const files::PageTable& table, const std::vector<std::string>& left_out) {
+  std::string head, line, rows;
+  std::vector<bool> shown;
+  for (const std::string& name : table.head) {
+    shown.push_back(std::find(left_out.begin(), left_out.end(), name) == left_out.end());
+    if (!shown.back()) continue;
+    head += "| " + name + " ";
+    line += "|---";
+  }
+  for (const auto& row : table.rows) {
+    for (std::size_t k = 0; k < row.size(); ++k) {
+      if (!shown[k]) continue;
+      rows += "| " + row[k].text + (row[k].paper ? fmt::format(" ({:.5g})", *row[k].paper) : "") + " ";
+    }
+    rows += "|\n";
+  }
+  return head + "|\n" + line + "|\n" + rows;
+}
+
+/// Writes tables between their marks in a file, "<!-- figures: ID -->".
+void write_to_readme(const std::string& readme, const std::vector<files::PageTable>& tables,
+                     const std::vector<std::string>& ids) {
+  if (readme.empty()) return;
+  for (const files::PageTable& table : tables) {
+    if (std::find(ids.begin(), ids.end(), table.id) == ids.end()) continue;
+    files::replace_figures(readme, table.id, markdown_of(table, {"in the paper", "holds if"}));
+  }
 }
 
 const char* verdict_of(const study::StudyClaim& c) {
@@ -106,7 +138,8 @@ std::vector<std::string> recordings_of(const StudyOptions& options) {
   if (!std::filesystem::is_directory(options.recordings, error))
     throw files::BadInput(options.recordings, 1, "no folder, expected one with recordings in CSV");
   for (const auto& entry : std::filesystem::directory_iterator(options.recordings)) {
-    if (entry.path().extension() == ".csv") paths.push_back(entry.path().string());
+    const std::string path = entry.path().string();
+    if (path.ends_with(".csv") || path.ends_with(".csv.gz")) paths.push_back(path);
   }
   std::sort(paths.begin(), paths.end());
   return paths;
@@ -136,6 +169,7 @@ void write(const StudyOptions& options, const std::vector<std::string>& recordin
   write_output((folder / "study.html").string(), page);
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
+  write_to_readme(options.readme, result.tables, {"statements"});
   for (const measurement::Warning& w : result.warnings) warn(w.text);
   std::string text =
       fmt::format("{} identifications in {:.1f} s, of {}.\n", result.fits, result.seconds, result.source);
@@ -159,6 +193,7 @@ void diagnose_paper(const StudyOptions& options, const files::CellFile& cell) {
   }
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
+  write_to_readme(options.readme, tables, {"physics", "candidates", "held_out", "contradictions", "consistency"});
   std::string text = found.statement + "\n";
   for (const study::PaperPhysics& p : found.physics)
     text += fmt::format("  {:22} {:.4g} {} ({:.3g} to {:.3g})\n", p.id, p.value, p.unit, p.low, p.high);
@@ -178,6 +213,8 @@ class StudyCommand final : public Command {
     c.add_option("--seeds", o_.study.seeds, "cells of each kind for the shares; 0: one run only")
         ->capture_default_str();
     c.add_option("--out", o_.out, "folder for the tables (CSV, JSON) and the page")->type_name("DIR");
+    c.add_option("--readme", o_.readme, "write the main tables to FILE, between '<!-- figures: ID -->' and their end")
+        ->type_name("FILE");
     c.add_flag("--diagnose-paper", o_.diagnose_paper,
                "find which physics the published figures of the paper ask for, instead of the study");
     add_output(c, o_.output);

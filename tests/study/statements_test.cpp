@@ -109,6 +109,18 @@ TEST(Statements, OnThePapersOwnNumbers) {
   for (const char* id : {"linear_parameters_close", "c1_largest_deviation"}) EXPECT_EQ(judge(id, o).holds, false) << id;
 }
 
+// With other models in their place, the same rule decides; without them it does not.
+TEST(Statements, WithoutDelayReplacesTheModels) {
+  Observations o = of_paper();
+  EXPECT_FALSE(judge("hw_best_estimation_without_delay", o).holds.has_value());
+  o.model[2]->estimation_fit = 80;
+  o.without_delay = {*o.model[1], *o.model[2], ""};
+  EXPECT_EQ(judge("hw_best_estimation_without_delay", o).holds, false);
+  o.without_delay.hammerstein_wiener->estimation_fit = 99;
+  EXPECT_EQ(judge("hw_best_estimation_without_delay", o).holds, true);
+  EXPECT_EQ(judge("hw_best_estimation", o).holds, false);
+}
+
 // Brown, Cai and DasGupta, Statistical Science 16 (2001) 101: Wilson's interval.
 TEST(Statements, SharesHaveWilsonsInterval) {
   const Share all = share_of(20, 20), none = share_of(0, 20), half = share_of(10, 20), nothing = share_of(0, 0);
