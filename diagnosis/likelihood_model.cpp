@@ -27,13 +27,14 @@ bool has_own_branch(const std::vector<MechanismSetting>& own, const std::vector<
 
 LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
                                  std::vector<PreparedRecording> records, const NoiseModel& noise,
-                                 const Loosened& loosened)
+                                 const Loosened& loosened, const LearnedError& learned)
     : cell_(cell),
       tables_(model::prepare<double, model::max_intervals>(cell)),
       own_(std::move(own)),
       records_(std::move(records)),
       facts_(recording_facts(cell, records_)),
-      calibration_(cell, records_, has_own_branch(own_, records_), loosened) {
+      learned_(learned),
+      calibration_(cell, records_, has_own_branch(own_, records_), loosened, learned) {
   for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording with fewer than two rows");
     samples_ += r.size();
@@ -61,7 +62,9 @@ void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
     if (k > 0) more.white_v2[k - 1] = std::max(more.white_v2[k - 1], more.white_v2[k]);
     more.edge_v2[k] = std::pow(noise_limits.edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
     if (k > 0) soc = std::clamp(soc + row.moved_soc, 0.0, 1.0);
-    more.slow_v2[k] = std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2);
+    more.slow_v2[k] =
+        std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2) + learned_.more_at(soc);
+    more.white_v2[k] += std::pow(noise_limits.white_share_of_ocv, 2) * learned_.more_at(soc);
   });
 }
 
@@ -83,8 +86,8 @@ NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel
   const auto cost_of = [&](const NoiseModel& n) {
     const std::vector<Whitener> by = whiteners_for(n);
     Columns e = raw;
-    whiten(e, by);
-    double sum = e.squaredNorm() + price_of_noise(n, nominal);
+    double sum = price_of_noise(n, nominal) + whiten(e, by, n);
+    sum += e.squaredNorm();
     for (const Whitener& w : by) sum += w.log_determinant();
     return sum;
   };
@@ -94,7 +97,9 @@ NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel
   for (const double factor : numerics.noise.amplitude_factors) {
     for (bool moved = true; moved;) {
       moved = false;
-      for (const auto member : {&NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::white_v, &NoiseModel::edge}) {
+      for (const auto member : amplitudes) {
+        const bool of_checks = member == &NoiseModel::current_check || member == &NoiseModel::voltage_check;
+        if (of_checks && checks_ == 0) continue;
         for (const double by : {factor, 1 / factor}) {
           NoiseModel n = best;
           n.*member = std::max(best.*member * by, nominal.*member);
@@ -164,33 +169,41 @@ Eigen::VectorXd LikelihoodModel::residual(const Hypothesis& h, const Eigen::Vect
   return e.col(0);
 }
 
-void LikelihoodModel::whiten(Columns& columns) const { whiten(columns, whiteners_); }
+void LikelihoodModel::whiten(Columns& columns) const { whiten(columns, whiteners_, noise_); }
 
-void LikelihoodModel::whiten(Columns& columns, const std::vector<Whitener>& by) const {
+double LikelihoodModel::whiten(Columns& columns, const std::vector<Whitener>& by, const NoiseModel& noise) const {
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(records_[r].size());
     by[r].whiten(columns.middleRows(row, rows));
     row += rows;
   }
-  if (checks_ > 0) whiten_checks(columns, row);
+  return checks_ > 0 ? whiten_checks(columns, row, noise) : 0;
 }
 
-/// Checks of one voltage channel share its drift: their covariance is I + w w', undone by (I + w w')^-1/2.
-void LikelihoodModel::whiten_checks(Columns& columns, Eigen::Index row) const {
+double LikelihoodModel::whiten_checks(Columns& columns, Eigen::Index row, const NoiseModel& noise) const {
+  double log_determinant = 0;
   for (const PreparedRecording& r : records_) {
     Eigen::VectorXd w = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(r.checks.size()));
     for (std::size_t j = 0; j < r.checks.size(); ++j) {
-      if (r.checks[j].channel == Check::Channel::voltage)
-        w[static_cast<Eigen::Index>(j)] = cell_.tolerance.drift_v / r.checks[j].deviation;
+      const auto at = static_cast<Eigen::Index>(j);
+      const Check& check = r.checks[j];
+      const bool voltage = check.channel == Check::Channel::voltage;
+      const double deviation = check.deviation(voltage ? noise.voltage_check : noise.current_check),
+                   wider = deviation / check.deviation();
+      columns.row(row + at) /= wider;
+      log_determinant += 2 * std::log(wider);
+      if (voltage) w[at] = cell_.tolerance.drift_v / deviation;
     }
     if (const double shared = w.squaredNorm(); shared > 0) {
+      log_determinant += std::log1p(shared);
       auto rows = columns.middleRows(row, w.size());
       const Eigen::RowVectorXd along = w.transpose() * rows;
       rows -= ((1 - 1 / std::sqrt(1 + shared)) / shared) * w * along;
     }
     row += w.size();
   }
+  return log_determinant;
 }
 
 }  // namespace bms::diagnosis

@@ -19,7 +19,8 @@ constexpr std::array<std::size_t, sizeof...(M)> indices = {model::mechanism_inde
 /// Each changes the charge that is counted, the drop of the voltage, or both.
 constexpr auto alike_at_one_current =
     indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange,
-            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation>;
+            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation, model::TemperatureResistance,
+            model::ChargeTransfer>;
 
 bool contains(const std::vector<std::size_t>& list, std::size_t m) {
   return std::find(list.begin(), list.end(), m) != list.end();
@@ -28,12 +29,16 @@ bool contains(const std::vector<std::size_t>& list, std::size_t m) {
 }  // namespace
 
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
+  double largest_a = current_limits.moving_c * capacity_ah / loaded_at_one_current;
+  for (const PreparedRecording& r : records) {
+    for (const double a : r.current_a) largest_a = std::isfinite(a) ? std::max(largest_a, std::abs(a)) : largest_a;
+  }
   std::vector<double> loaded_a;
   std::size_t edges = 0;
   for (const PreparedRecording& r : records) {
     for (std::size_t k = 0; k < r.size(); ++k) {
       const double a = r.current_a[k];
-      if (std::abs(a) > current_limits.moving_c * capacity_ah) loaded_a.push_back(a);
+      if (std::abs(a) > loaded_at_one_current * largest_a) loaded_a.push_back(a);
       if (k > 0 && std::abs(a - r.current_a[k - 1]) > current_limits.edge_c * capacity_ah) ++edges;
     }
   }
@@ -45,7 +50,8 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double capac
   return static_cast<double>(near) >= current_limits.one_current_share * static_cast<double>(loaded_a.size());
 }
 
-void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Finding>& findings) {
+void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
+                              std::vector<Finding>& findings) {
   if (!has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) return;
   const Hypothesis base = likelihood.base();
   std::vector<std::size_t> found;
@@ -54,14 +60,19 @@ void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Fin
     if (std::find(alike_at_one_current.begin(), alike_at_one_current.end(), f.setting.index) ==
         alike_at_one_current.end())
       continue;
-    std::size_t added = 0;
+    std::vector<std::size_t> alike;
     for (const std::size_t m : alike_at_one_current) {
-      if (contains(found, m) || contains(f.equivalent_to, m) || base.find(m) != nullptr) continue;
-      f.equivalent_to.push_back(m);
-      ++added;
+      if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr) alike.push_back(m);
     }
-    // none is more probable than another
-    f.probability /= static_cast<double>(1 + added);
+    f.probability /= static_cast<double>(1 + alike.size());  // none is more probable than another
+    for (HypothesisFit& fit : search.replaced(best, f.setting.index, alike)) {
+      const std::size_t m = fit.hypothesis.settings.back().index;
+      std::erase(alike, m);
+      f.equivalent_to.push_back(m);
+      f.rivals.push_back({std::move(fit.hypothesis), std::move(fit.covariance)});
+    }
+    // those that these recordings cannot test have no fit
+    f.equivalent_to.insert(f.equivalent_to.end(), alike.begin(), alike.end());
   }
 }
 
