@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <functional>
 #include <limits>
 #include <map>
 #include <optional>
@@ -18,9 +17,9 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
-#include <nlohmann/json.hpp>
 
 #include "benchmark/injected_faults.hpp"
+#include "benchmark/semi_real_tables.hpp"
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
@@ -32,6 +31,7 @@ namespace {
 
 using bms::benchmark::injected_faults;
 using bms::benchmark::InjectedFault;
+using Result = bms::benchmark::SemiRealResult;
 using bms::diagnosis::Finding;
 using bms::measurement::Recording;
 
@@ -50,18 +50,6 @@ struct RealSet {
   bool ocv_from_rests = false, ocv_from_load = false;
   std::optional<double> initial_soc;
   std::vector<std::string> calibration, healthy, ocv;
-};
-
-/// One diagnosis.
-struct Result {
-  std::string set, fault;  ///< fault empty: a null
-  bool held_out = false;
-  double size = 0;
-  std::string verdict, found, withheld;
-  bool detected = false, first_right = false, named = false;
-  std::optional<double> over_limit;  ///< size over the stated detection limit
-  std::optional<double> sigmas;      ///< of the found size from the true one
-  double error_v = 0, remaining_v = 0, wall_s = 0, hours = 0;
 };
 
 std::vector<RealSet> read_sets(const Options& o) {
@@ -184,6 +172,7 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
   const bms::diagnosis::Diagnosis d = diagnose(o, p, record);
   Result r;
   r.set = set.name;
+  r.cell = set.cell;
   r.fault = fault == nullptr ? "" : std::string(fault->id);
   r.held_out = set.held_out;
   r.size = size;
@@ -217,94 +206,6 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
   for (const std::size_t e : first.equivalent_to) r.first_right |= bms::model::catalogue[e].id == fault->id;
   r.sigmas = sigmas_of(first, *fault, size, p.cell.parameters.capacity_ah);
   return r;
-}
-
-std::string line_of(const Result& r) {
-  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}\n", r.set,
-                     r.fault.empty() ? "(healthy)" : r.fault, r.size,
-                     r.over_limit ? fmt::format("{:.2g} L", *r.over_limit) : "-", r.verdict, 1e3 * r.error_v,
-                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld);
-}
-
-using Which = std::function<bool(const Result&)>;
-
-/// "3 of 12".
-std::string share(const std::vector<Result>& results, const Which& counts, const Which& yes) {
-  std::size_t of = 0, n = 0;
-  for (const Result& r : results) {
-    if (!counts(r)) continue;
-    ++of;
-    n += yes(r) ? 1 : 0;
-  }
-  return fmt::format("{} of {}", n, of);
-}
-
-std::string hours_of(const std::vector<Result>& results, bool held_out) {
-  double hours = 0;
-  for (const Result& r : results) hours += r.fault.empty() && r.held_out == held_out ? r.hours : 0;
-  return fmt::format("{:.1f} h", hours);
-}
-
-std::string table_of(const std::vector<Result>& results) {
-  std::string text = "\n| figure | development cells | held-out cells |\n|---|---|---|\n";
-  const auto row = [&](const char* name, const Which& counts, const Which& yes) {
-    text += fmt::format("| {} |", name);
-    for (const bool held_out : {false, true})
-      text += " " +
-              share(
-                  results, [&](const Result& r) { return r.held_out == held_out && counts(r); }, yes) +
-              " |";
-    text += "\n";
-  };
-  const Which healthy = [](const Result&r) { return r.fault.empty(); }, named = [](const Result&r) { return r.named; },
-              right = [](const Result&r) { return r.first_right; },
-              wrong = [](const Result&r) { return r.named && !r.first_right; };
-  const auto verdict = [](std::string_view what) -> Which {
-    return [what](const Result& r) { return r.verdict == what; };
-  };
-  const auto limits = [](double low, double high) -> Which {
-    return [=](const Result& r) {
-      return !r.fault.empty() && r.over_limit && *r.over_limit >= low && *r.over_limit < high;
-    };
-  };
-  const double no_end = std::numeric_limits<double>::infinity();
-  text += fmt::format("| healthy, left out | {} | {} |\n", hours_of(results, false), hours_of(results, true));
-  row("a cause is named", healthy, named);
-  row("UNKNOWN", healthy, verdict("UNKNOWN"));
-  row("not enough healthy data, or not testable", healthy, verdict("NOT_TESTABLE"));
-  row("data fault", healthy, verdict("DATA_FAULT"));
-  row("fault of twice its detection limit and above: first name right", limits(2, no_end), right);
-  row("the same: another name first", limits(2, no_end), wrong);
-  row("of half to twice the limit: first name right", limits(0.5, 2), right);
-  row("of half the limit and below: another name first", limits(0, 0.5), wrong);
-  row(
-      "without a limit: another name first", [](const Result& r) { return !r.fault.empty() && !r.over_limit; }, wrong);
-  row(
-      "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
-      [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
-  double slowest_s = 0;
-  for (const Result& r : results) slowest_s = std::max(slowest_s, r.wall_s);
-  return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
-}
-
-std::string json_of(const std::vector<Result>& results) {
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (const Result& r : results) {
-    list.push_back({{"set", r.set},
-                    {"fault", r.fault},
-                    {"size", r.size},
-                    {"held_out", r.held_out},
-                    {"verdict", r.verdict},
-                    {"found", r.found},
-                    {"withheld", r.withheld},
-                    {"over_limit", r.over_limit ? nlohmann::ordered_json(*r.over_limit) : nlohmann::ordered_json()},
-                    {"first_right", r.first_right},
-                    {"sigmas", r.sigmas ? nlohmann::ordered_json(*r.sigmas) : nlohmann::ordered_json()},
-                    {"error_v", r.error_v},
-                    {"remaining_v", r.remaining_v},
-                    {"wall_s", r.wall_s}});
-  }
-  return list.dump(1) + "\n";
 }
 
 /// Sizes of a fault to put in; none if they are to be multiples of a limit that the healthy recording does not state.

@@ -12,8 +12,14 @@ constexpr const Thresholds::Adequacy& adequacy_limits = thresholds.adequacy;
 
 double gained(const Adequacy& a) { return a.control_cost - a.best_cost; }
 
-double explained_share(const Adequacy& a) {
-  const double gain = std::max(gained(a), 0.0);
+/// Sum of squares of the checks of instruments.
+double of_checks(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  return fit.residual.tail(static_cast<Eigen::Index>(likelihood.samples() - likelihood.readings())).squaredNorm();
+}
+
+/// Share of the voltage's misfit that is explained. What a check gains says nothing of it.
+double share_of_misfit(const Adequacy& a, double gain_of_checks) {
+  const double gain = std::max(gained(a) - gain_of_checks, 0.0);
   return gain + a.residual.gain > 0 ? gain / (gain + a.residual.gain) : 1;
 }
 
@@ -34,13 +40,13 @@ Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const Hyp
   const HypothesisFit control_fit = likelihood.fit(control.hypothesis, control.calibration, iterations),
                       best_fit = likelihood.fit(survivors.best.hypothesis, survivors.best.calibration, iterations);
   Adequacy a{control_fit.cost, best_fit.cost, test_residual(likelihood, best_fit)};
-  a.explained = explained_share(a);
+  a.explained = share_of_misfit(a, of_checks(likelihood, control_fit) - of_checks(likelihood, best_fit));
   // what explains little, and that incompletely, is not a cause
   if (!survivors.best.hypothesis.added().empty() && gained(a) < thresholds.decision.faint &&
       a.explained < adequacy_limits.explained) {
     survivors = {control, {}, {}, {}};
     a = {control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
-    a.explained = explained_share(a);
+    a.explained = share_of_misfit(a, 0);
   }
   likelihood.set_noise(survivors.best.noise);
   a.found = !survivors.best.hypothesis.added().empty();

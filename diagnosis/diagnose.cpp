@@ -137,12 +137,9 @@ void add_location(const LikelihoodModel& likelihood, const HypothesisFit& best, 
                   const Adequacy& adequacy, const Errors& errors, Diagnosis& d) {
   const bool unexplained = d.verdict == Verdict::unknown || !adequacy.found;
   d.explained_share = contributed.explained_share;
-  if (names(d.verdict)) {  // of the error of the cell file as it is, which is the one that is reported
-    const double white_v2 = d.noise.white_v * d.noise.white_v, file_v2 = std::pow(errors.file_v, 2);
-    if (file_v2 > white_v2)
-      d.explained_share =
-          std::clamp((file_v2 - std::pow(contributed.remaining_rmse_v, 2)) / (file_v2 - white_v2), 0.0, 1.0);
-  }
+  // of the error of the cell file as it is, which is the one that is reported
+  if (names(d.verdict))
+    d.explained_share = explained_share(errors.file_v, contributed.remaining_rmse_v, d.noise.white_v);
   d.unexplained_rmse_v = contributed.remaining_rmse_v;
   d.unexplained_share = 1 - d.explained_share;
   d.spans = unexplained ? adequacy.residual.spans : contributed.spans;
@@ -256,9 +253,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);
-  add_alike_at_one_current(likelihood, d.findings);
-  d.candidates = ranking_of(search, likelihood, control, grown, survivors);
+  add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
   const Errors errors = errors_of(search, likelihood, options.healthy);
+  d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
   d.verdict = verdict_of(adequacy, d, contributed, errors);
   d.interrupted = search.stopped();
   // that nothing was found yet does not mean that nothing is there

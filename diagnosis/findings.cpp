@@ -83,16 +83,18 @@ std::vector<Finding> findings_of(Search& search, const Survivors& survivors, con
 }
 
 std::vector<Ranked> ranking_of(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
-                               const Grown& grown, Survivors& survivors) {
+                               const Grown& grown, Survivors& survivors, double file_v) {
+  const bool found = !survivors.best.hypothesis.added().empty();
   std::vector<Ranked> ranking;
   const auto rank = [&](const HypothesisFit& f) {
     const std::vector<std::size_t> ids = f.hypothesis.added();
     if (std::any_of(ranking.begin(), ranking.end(), [&](const Ranked& r) { return r.ids == ids; }))
       return;  // the same from another start
-    ranking.push_back(
-        {ids, 0, search.score(control) - search.score(f), contributions(likelihood, control, f).explained_share});
+    const Contributions c = contributions(likelihood, control, f);
+    const double share =
+        found ? explained_share(file_v, c.remaining_rmse_v, search.nominal_noise().white_v) : c.explained_share;
+    ranking.push_back({ids, 0, search.score(control) - search.score(f), share});
   };
-  const bool found = !survivors.best.hypothesis.added().empty();
   if (found) {
     rank(survivors.best);
     for (auto& [m, fits] : survivors.rivals) {

@@ -15,8 +15,10 @@ namespace bms::diagnosis {
 /// One per mechanism of the best hypothesis, the largest gain first.
 std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed);
 
-/// The best hypothesis and its rivals; if it adds nothing, the mechanisms tried alone. The largest gain first.
+/// The best hypothesis and its rivals; if it adds nothing, the mechanisms tried alone. The largest gain first. The
+/// share that each explains is of the cell file's error file_v [V] or, if the best adds nothing, of what the base
+/// parameters leave.
 std::vector<Ranked> ranking_of(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
-                               const Grown& grown, Survivors& survivors);
+                               const Grown& grown, Survivors& survivors, double file_v);
 
 }  // namespace bms::diagnosis

@@ -83,8 +83,8 @@ NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel
   const auto cost_of = [&](const NoiseModel& n) {
     const std::vector<Whitener> by = whiteners_for(n);
     Columns e = raw;
-    whiten(e, by);
-    double sum = e.squaredNorm() + price_of_noise(n, nominal);
+    double sum = price_of_noise(n, nominal) + whiten(e, by, n);
+    sum += e.squaredNorm();
     for (const Whitener& w : by) sum += w.log_determinant();
     return sum;
   };
@@ -94,7 +94,9 @@ NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel
   for (const double factor : numerics.noise.amplitude_factors) {
     for (bool moved = true; moved;) {
       moved = false;
-      for (const auto member : {&NoiseModel::fast_v, &NoiseModel::slow_v, &NoiseModel::white_v, &NoiseModel::edge}) {
+      for (const auto member : amplitudes) {
+        const bool of_checks = member == &NoiseModel::current_check || member == &NoiseModel::voltage_check;
+        if (of_checks && checks_ == 0) continue;
         for (const double by : {factor, 1 / factor}) {
           NoiseModel n = best;
           n.*member = std::max(best.*member * by, nominal.*member);
@@ -164,33 +166,41 @@ Eigen::VectorXd LikelihoodModel::residual(const Hypothesis& h, const Eigen::Vect
   return e.col(0);
 }
 
-void LikelihoodModel::whiten(Columns& columns) const { whiten(columns, whiteners_); }
+void LikelihoodModel::whiten(Columns& columns) const { whiten(columns, whiteners_, noise_); }
 
-void LikelihoodModel::whiten(Columns& columns, const std::vector<Whitener>& by) const {
+double LikelihoodModel::whiten(Columns& columns, const std::vector<Whitener>& by, const NoiseModel& noise) const {
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const auto rows = static_cast<Eigen::Index>(records_[r].size());
     by[r].whiten(columns.middleRows(row, rows));
     row += rows;
   }
-  if (checks_ > 0) whiten_checks(columns, row);
+  return checks_ > 0 ? whiten_checks(columns, row, noise) : 0;
 }
 
-/// Checks of one voltage channel share its drift: their covariance is I + w w', undone by (I + w w')^-1/2.
-void LikelihoodModel::whiten_checks(Columns& columns, Eigen::Index row) const {
+double LikelihoodModel::whiten_checks(Columns& columns, Eigen::Index row, const NoiseModel& noise) const {
+  double log_determinant = 0;
   for (const PreparedRecording& r : records_) {
     Eigen::VectorXd w = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(r.checks.size()));
     for (std::size_t j = 0; j < r.checks.size(); ++j) {
-      if (r.checks[j].channel == Check::Channel::voltage)
-        w[static_cast<Eigen::Index>(j)] = cell_.tolerance.drift_v / r.checks[j].deviation;
+      const auto at = static_cast<Eigen::Index>(j);
+      const Check& check = r.checks[j];
+      const bool voltage = check.channel == Check::Channel::voltage;
+      const double deviation = check.deviation(voltage ? noise.voltage_check : noise.current_check),
+                   wider = deviation / check.deviation();
+      columns.row(row + at) /= wider;
+      log_determinant += 2 * std::log(wider);
+      if (voltage) w[at] = cell_.tolerance.drift_v / deviation;
     }
     if (const double shared = w.squaredNorm(); shared > 0) {
+      log_determinant += std::log1p(shared);
       auto rows = columns.middleRows(row, w.size());
       const Eigen::RowVectorXd along = w.transpose() * rows;
       rows -= ((1 - 1 / std::sqrt(1 + shared)) / shared) * w * along;
     }
     row += w.size();
   }
+  return log_determinant;
 }
 
 }  // namespace bms::diagnosis

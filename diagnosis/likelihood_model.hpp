@@ -123,8 +123,10 @@ class LikelihoodModel {
   void carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const;
   std::shared_ptr<const Linearisation> linearised(const Hypothesis& h, const Eigen::VectorXd& u) const;
   std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
-  void whiten(Columns& columns, const std::vector<Whitener>& by) const;
-  void whiten_checks(Columns& columns, Eigen::Index row) const;
+  /// Returns the logarithm of the determinant of the checks' covariance.
+  double whiten(Columns& columns, const std::vector<Whitener>& by, const NoiseModel& noise) const;
+  /// Checks of one voltage channel share its drift: their covariance is I + w w', undone by (I + w w')^-1/2.
+  double whiten_checks(Columns& columns, Eigen::Index row, const NoiseModel& noise) const;
 
   model::CellParameters<> cell_;
   model::Cell<double, model::max_intervals> tables_;

@@ -115,12 +115,15 @@ double explained_where(const LikelihoodModel& likelihood, const HypothesisFit& b
 
 }  // namespace
 
+double explained_share(double error_v, double remaining_v, double white_v) {
+  const double visible_v2 = error_v * error_v - white_v * white_v;
+  return visible_v2 > 0 ? std::clamp((error_v * error_v - remaining_v * remaining_v) / visible_v2, 0.0, 1.0) : 0;
+}
+
 Contributions contributions(const LikelihoodModel& likelihood, const HypothesisFit& base, const HypothesisFit& fit) {
   Contributions c;
   const measurement::MeanSquare before = error_v(likelihood, base), after = error_v(likelihood, fit);
-  const double white = likelihood.noise().white_v * likelihood.noise().white_v * static_cast<double>(after.count());
-  c.explained_share =
-      before.sum() > white ? std::clamp((before.sum() - after.sum()) / (before.sum() - white), 0.0, 1.0) : 0;
+  c.explained_share = explained_share(before.root(), after.root(), likelihood.noise().white_v);
   c.remaining_rmse_v = after.root();
   const std::vector<std::size_t> added = fit.hypothesis.added();
   if (added.empty()) return c;

@@ -19,6 +19,9 @@ struct Contributions {
   double remaining_rmse_v = 0;              ///< measured less extended model, base parameters fitted [V]
 };
 
+/// Share of a squared error, less that of the white noise, that is gone; all RMS [V].
+double explained_share(double error_v, double remaining_v, double white_v);
+
 /// base: the calibration alone. fit: with mechanisms.
 Contributions contributions(const LikelihoodModel& likelihood, const HypothesisFit& base, const HypothesisFit& fit);
 

@@ -13,8 +13,9 @@ double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
   const auto price = [](double ratio) {
     return ratio > 1 ? std::pow(std::log(ratio) / thresholds.noise.amplitude_log_sigma, 2) : 0;
   };
-  return price(n.white_v / nominal.white_v) + price(n.fast_v / nominal.fast_v) + price(n.slow_v / nominal.slow_v) +
-         price(n.edge / nominal.edge);
+  double sum = 0;
+  for (const auto amplitude : amplitudes) sum += price(n.*amplitude / nominal.*amplitude);
+  return sum;
 }
 
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,

@@ -13,6 +13,7 @@
 // Stochastic Control Theory, 1970, ch. 7.)
 #pragma once
 
+#include <array>
 #include <span>
 #include <vector>
 
@@ -26,7 +27,9 @@ struct NoiseModel {
   double white_v = 0.001;
   double fast_v = 0.0015, fast_s = thresholds.noise.fast_correlation_s;
   double slow_v = 0.001, slow_s = thresholds.noise.slow_correlation_s;
-  double edge = 1;  ///< factor on the error that a step of the current adds
+  double edge = 1;           ///< factor on the error that a step of the current adds
+  double current_check = 1;  ///< factor on the steady part of the deviation of checks of the current (Check::steady)
+  double voltage_check = 1;  ///< the same of the voltage
   bool operator==(const NoiseModel&) const = default;
 };
 
@@ -38,6 +41,10 @@ struct RowNoise {
 
   explicit RowNoise(std::size_t rows = 0) : white_v2(rows, 0.0), edge_v2(rows, 0.0), slow_v2(rows, 0.0) {}
 };
+
+/// Amplitudes of a noise model that are estimated.
+inline constexpr std::array amplitudes = {&NoiseModel::fast_v, &NoiseModel::slow_v,        &NoiseModel::white_v,
+                                          &NoiseModel::edge,   &NoiseModel::current_check, &NoiseModel::voltage_check};
 
 /// -2 log prior of noise that is larger than the nominal one; 0 if no amplitude is. Each amplitude costs
 /// (ln ratio / Thresholds::Noise::amplitude_log_sigma)^2: little compared with a gross mismatch, much compared with

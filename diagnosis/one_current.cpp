@@ -45,7 +45,8 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double capac
   return static_cast<double>(near) >= current_limits.one_current_share * static_cast<double>(loaded_a.size());
 }
 
-void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Finding>& findings) {
+void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
+                              std::vector<Finding>& findings) {
   if (!has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) return;
   const Hypothesis base = likelihood.base();
   std::vector<std::size_t> found;
@@ -54,14 +55,19 @@ void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Fin
     if (std::find(alike_at_one_current.begin(), alike_at_one_current.end(), f.setting.index) ==
         alike_at_one_current.end())
       continue;
-    std::size_t added = 0;
+    std::vector<std::size_t> alike;
     for (const std::size_t m : alike_at_one_current) {
-      if (contains(found, m) || contains(f.equivalent_to, m) || base.find(m) != nullptr) continue;
-      f.equivalent_to.push_back(m);
-      ++added;
+      if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr) alike.push_back(m);
     }
-    // none is more probable than another
-    f.probability /= static_cast<double>(1 + added);
+    f.probability /= static_cast<double>(1 + alike.size());  // none is more probable than another
+    for (HypothesisFit& fit : search.replaced(best, f.setting.index, alike)) {
+      const std::size_t m = fit.hypothesis.settings.back().index;
+      std::erase(alike, m);
+      f.equivalent_to.push_back(m);
+      f.rivals.push_back({std::move(fit.hypothesis), std::move(fit.covariance)});
+    }
+    // those that these recordings cannot test have no fit
+    f.equivalent_to.insert(f.equivalent_to.end(), alike.begin(), alike.end());
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/search.hpp"
 #include "diagnosis/verdict.hpp"
 
 namespace bms::diagnosis {
@@ -15,7 +16,9 @@ namespace bms::diagnosis {
 /// Returns true if nearly all load has one current in one direction, switched on or off only a few times.
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);
 
-/// Adds to a finding those causes that equal it if the recordings have one current. They have no fit of their own.
-void add_alike_at_one_current(const LikelihoodModel& likelihood, std::vector<Finding>& findings);
+/// Adds to each finding of `best` those causes that equal it if the recordings have one current, each fitted in its
+/// place.
+void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
+                              std::vector<Finding>& findings);
 
 }  // namespace bms::diagnosis

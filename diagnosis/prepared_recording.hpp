@@ -1,6 +1,7 @@
 // The input of a diagnosis: one recording, its initial state of charge, and checks of its instruments.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -16,7 +17,10 @@ struct Check {
   double current_a = 0;  ///< mean reading
   double read = 0;       ///< mean of the instrument [A or V]
   double reference = 0;  ///< mean of the trusted one [A or V]
-  double deviation = 1;  ///< standard deviation of read less reference if the hypothesis holds
+  double steady = 1;     ///< part of the deviation that does not grow with the instrument's error [A or V]
+  double unsteady = 0;   ///< part that does
+  /// Standard deviation of read less reference if the hypothesis holds. times: factor on the steady part.
+  double deviation(double times = 1) const { return std::hypot(times * steady, unsteady); }
 };
 
 /// The columns are those of the recording, except for values that a check has removed. Equal length, time_s ascending.

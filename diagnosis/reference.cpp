@@ -60,19 +60,19 @@ void add_checks(PreparedRecording& r, const Channel& channel, const model::CellP
     }
     if (n < 1) continue;
     for (double* mean : {&c.time_s, &c.current_a, &c.read, &c.reference}) *mean /= n;
-    c.deviation = check_deviation(channel.kind, c.read - c.reference, n, cell);
+    set_deviation(c, n, cell);
     r.checks.push_back(c);
   }
 }
 
 }  // namespace
 
-double check_deviation(Check::Channel channel, double apart, double readings, const model::CellParameters<>& cell) {
-  const bool voltage = channel == Check::Channel::voltage;
+void set_deviation(Check& check, double readings, const model::CellParameters<>& cell) {
+  const bool voltage = check.channel == Check::Channel::voltage;
   const double noise = voltage ? cell.noise.voltage_v : cell.noise.current_a,
-               own = voltage ? reference_limits.meter_v : reference_limits.meter_c * cell.capacity_ah,
-               unsteady = reference_limits.unsteady_share;
-  return std::sqrt(noise * noise / readings + own * own + unsteady * unsteady * apart * apart);
+               own = voltage ? reference_limits.meter_v : reference_limits.meter_c * cell.capacity_ah;
+  check.steady = std::hypot(noise / std::sqrt(readings), own);
+  check.unsteady = reference_limits.unsteady_share * std::abs(check.read - check.reference);
 }
 
 void average_references(PreparedRecording& r, std::span<const double> current_ref_a,

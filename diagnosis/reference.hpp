@@ -16,8 +16,8 @@ namespace bms::diagnosis {
 void average_references(PreparedRecording& record, std::span<const double> current_ref_a,
                         std::span<const double> voltage_ref_v, const model::CellParameters<>& cell);
 
-/// Standard deviation of a mean of so many readings less its reference: noise, the reference's own error, and an error
-/// that is not quite steady. apart: reading less reference [A or V].
-double check_deviation(Check::Channel channel, double apart, double readings, const model::CellParameters<>& cell);
+/// Sets the deviation of a check that is the mean of so many readings: noise and the reference's own error, and an
+/// error that is not quite steady.
+void set_deviation(Check& check, double readings, const model::CellParameters<>& cell);
 
 }  // namespace bms::diagnosis

@@ -67,7 +67,8 @@ bool alike(const NoiseModel& a, const NoiseModel& b) {
   const auto near = [](double x, double y) {
     return x < thresholds.noise.same_amplitude * y && y < thresholds.noise.same_amplitude * x;
   };
-  return near(a.white_v, b.white_v) && near(a.fast_v, b.fast_v) && near(a.slow_v, b.slow_v) && near(a.edge, b.edge);
+  return std::all_of(amplitudes.begin(), amplitudes.end(),
+                     [&](const auto amplitude) { return near(a.*amplitude, b.*amplitude); });
 }
 
 /// Fitted again with the noise model that its own residual makes most probable.
@@ -227,6 +228,21 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
       worth.push_back(all[a]);
   }
   return fitted(from, worth, r.best.cost + search_limits.hopeless);
+}
+
+std::vector<HypothesisFit> Search::replaced(const HypothesisFit& best, std::size_t mechanism,
+                                            const std::vector<std::size_t>& by) {
+  if (by.empty()) return {};
+  likelihood_.set_noise(best.noise);
+  const HypothesisFit from =
+      likelihood_.fit(without(best.hypothesis, mechanism), best.calibration, numerics.fit.reduced_iterations);
+  const Screen screen(likelihood_, from, by);
+  likelihood_.linearise(from.hypothesis, from.calibration);
+  std::vector<HypothesisFit> fits(screen.candidates().size());
+  measurement::in_parallel(fits.size(), [&](std::size_t k) {
+    fits[k] = likelihood_.fit(with(from.hypothesis, screen.candidates()[k].start), from.calibration);
+  });
+  return fits;
 }
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,

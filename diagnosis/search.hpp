@@ -55,6 +55,11 @@ class Search {
   std::vector<HypothesisFit> in_place_of(const Replacement& r, const std::vector<std::size_t>& over,
                                          std::map<std::size_t, double>& likeness);
 
+  /// Fits with each of `by` in the place of one mechanism of the best hypothesis, however bad. Those that these
+  /// recordings cannot test are left out. The new mechanism is the last of its hypothesis.
+  std::vector<HypothesisFit> replaced(const HypothesisFit& best, std::size_t mechanism,
+                                      const std::vector<std::size_t>& by);
+
   /// Returns true if a cell file with it would do as well as with what was there. What helps only together with the
   /// start and the sensor's wander in this recording is not a cause. A first mechanism always passes: of two that hide
   /// each other, one alone makes the error larger.

@@ -78,7 +78,7 @@ void LikelihoodModel::run(const std::vector<model::MechanismValues<S>>& values, 
     const S expected = c.channel == Check::Channel::current
                            ? S(setup.laws.true_current(S(c.read) - base.offset_a(record, c.time_s)) - c.reference)
                            : S(setup.laws.reading(at_terminals) - c.read);
-    check(j, S(expected * (1 / c.deviation)));
+    check(j, S(expected * (1 / c.deviation())));
   }
 }
 

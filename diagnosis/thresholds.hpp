@@ -292,7 +292,7 @@ struct Thresholds {
   struct Design {
     double separates = 40;      ///< expected gain from which two hypotheses are separated: more than
                                 ///< Decision::tie_inseparable, because no forecast is exact
-    std::size_t rivals = 5;     ///< hypotheses compared at most, the finding included
+    std::size_t rivals = 8;     ///< hypotheses compared at most, the finding included
     double rows = 1'500;        ///< of a simulated course at most: a coarse one is enough to choose by
     double survey_step_s = 10;  ///< [s] step by which the courses' durations are compared
     double soc_lowest = 0.02, soc_highest = 0.99;  ///< that the cell may reach

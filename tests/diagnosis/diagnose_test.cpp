@@ -43,6 +43,8 @@ TEST(Diagnose, NamesALargerResistanceAndWhereItsEffectIs) {
   EXPECT_THAT(ids_of(d), ElementsAre("resistance_growth"));
   EXPECT_NE(d.verdict, Verdict::unknown);
   EXPECT_NEAR(d.findings.front().setting.value[0], 0.003 / 0.0133, 0.04);
+  ASSERT_FALSE(d.candidates.empty());
+  EXPECT_DOUBLE_EQ(d.candidates.front().explained_share, d.explained_share) << "both are shares of the same error";
 }
 
 TEST(Diagnose, NamesAContactThatHasChangedAndWhen) {
@@ -148,7 +150,7 @@ TEST(Diagnose, LeakageAndCurrentOffsetExcludeEachOtherWithoutATrustedAmmeter) {
   const Hypothesis leaking = with(likelihood.base(), leakage, likelihood.cell());
   EXPECT_TRUE(not_testable(likelihood, leaking, offset).has_value());
   EXPECT_FALSE(not_testable(likelihood, likelihood.base(), offset).has_value());
-  r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002}};
+  r.checks = {{Check::Channel::current, 900, 3, 3.01, 3, 0.002, 0}};
   const LikelihoodModel trusted(test::table9(), {}, {r}, NoiseModel{});
   EXPECT_FALSE(not_testable(trusted, leaking, offset).has_value()) << "a trusted ammeter distinguishes them";
 }

@@ -1,6 +1,9 @@
 // Which experiment is proposed, and whether its recording decides.
 #include "diagnosis/next_experiment.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 #include <gmock/gmock.h>
 
 #include "diagnosis/reference.hpp"
@@ -128,11 +131,36 @@ TEST(Reference, VoltageChecksDistinguishAnOffsetFromAGainAndAContact) {
   EXPECT_GT(cost("contact_step") - cost("voltage_offset"), 30);
 }
 
+/// Readings behind leads, with trusted instruments at the cell whose error wanders by more than they promise.
+TEST(Reference, AMeterThatIsNotQuiteSteadyDoesNotHideACause) {
+  const std::vector<double> current_a = test::drive(0.4, 34);
+  PreparedRecording r = test::recorded(current_a, 0.7, 34, [](std::size_t, double a, double) { return 0.02 * a; });
+  const std::vector<double> cell_v = test::recorded(current_a, 0.7, 34).voltage_v.copy();
+  std::vector<double> reference_a, reference_v;
+  for (std::size_t k = 0; k < r.size(); ++k) {
+    const double wander = std::sin(static_cast<double>(k) / 150);
+    reference_a.push_back(current_a[k] * 1.007 + 0.003 * wander);
+    reference_v.push_back(cell_v[k] + 0.008 * wander);
+  }
+  const auto verdict = [&](bool current, bool voltage) {
+    PreparedRecording with = r;
+    const std::vector<double> none;
+    average_references(with, current ? reference_a : none, voltage ? reference_v : none, test::table9());
+    const Diagnosis d = diagnose(test::table9(), {}, {with});
+    const bool resistance = std::any_of(d.findings.begin(), d.findings.end(), [](const Finding& f) {
+      return f.setting.index == index_of("resistance_growth") || f.setting.index == index_of("contact_step");
+    });
+    return resistance ? d.verdict : Verdict::unknown;
+  };
+  EXPECT_NE(verdict(false, true), Verdict::unknown);
+  EXPECT_NE(verdict(true, true), Verdict::unknown);
+}
+
 /// Of all mechanisms that a check depends on.
 TEST(Reference, DerivativesOfChecksEqualFiniteDifferences) {
   PreparedRecording r = with_open_contactor(0.1);
-  r.checks.push_back({Check::Channel::voltage, 4'000, 2, 3.31, 3.3, 0.001});
-  r.checks.push_back({Check::Channel::voltage, 4'100, -2, 3.21, 3.2, 0.001});
+  r.checks.push_back({Check::Channel::voltage, 4'000, 2, 3.31, 3.3, 0.001, 0});
+  r.checks.push_back({Check::Channel::voltage, 4'100, -2, 3.21, 3.2, 0.001, 0});
   const LikelihoodModel likelihood(test::table9(), {}, {r}, NoiseModel{});
   const auto checks = static_cast<Eigen::Index>(r.checks.size());
   const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(likelihood.calibration().size()), 0.2);

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/next_experiment.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -52,6 +53,10 @@ TEST(OneCurrent, AnErrorOfTheCurrentIsNotNamedAsAnotherCauseAlone) {
           << model::catalogue[f.setting.index].id;
       EXPECT_LT(f.probability, 0.5) << model::catalogue[f.setting.index].id;
     }
+    if (!names(d.verdict)) continue;
+    const auto next = next_experiment(test::table9(), d, false);
+    ASSERT_TRUE(next) << "an answer that leaves several causes must say what would decide";
+    EXPECT_GE(next->separates.size(), 4U) << next->profile;
   }
 }
 

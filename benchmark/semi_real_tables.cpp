@@ -1,0 +1,144 @@
+#include "benchmark/semi_real_tables.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace bms::benchmark {
+
+namespace {
+
+/// Multiples of the stated detection limit from which a fault must be found, and up to which nothing may be named
+/// wrongly: 2 and 0.5, of limits that are rounded.
+constexpr double plainly_above = 1.99, plainly_below = 0.51;
+
+using Result = SemiRealResult;
+using Which = std::function<bool(const Result&)>;
+
+/// "3 of 12".
+std::string share(const std::vector<Result>& results, const Which& counts, const Which& yes) {
+  std::size_t of = 0, n = 0;
+  for (const Result& r : results) {
+    if (!counts(r)) continue;
+    ++of;
+    n += yes(r) ? 1 : 0;
+  }
+  return fmt::format("{} of {}", n, of);
+}
+
+std::string hours_of(const std::vector<Result>& results, bool held_out) {
+  double hours = 0;
+  for (const Result& r : results) hours += r.fault.empty() && r.held_out == held_out ? r.hours : 0;
+  return fmt::format("{:.1f} h", hours);
+}
+
+/// The same figures for each cell. Faults are those of twice their detection limit and above.
+std::string by_cell(const std::vector<Result>& results) {
+  std::string text =
+      "\n| cell | hours | nulls named | faults detected | named first | another name first | size within two sigma |\n"
+      "|---|---|---|---|---|---|---|\n";
+  std::vector<std::string> cells;
+  for (const Result& r : results) {
+    if (std::find(cells.begin(), cells.end(), r.cell) == cells.end()) cells.push_back(r.cell);
+  }
+  for (const std::string& cell : cells) {
+    const Which null = [&](const Result&r) { return r.cell == cell && r.fault.empty(); },
+                fault =
+                    [&](const Result&r) {
+                      return r.cell == cell && !r.fault.empty() && r.over_limit.value_or(0) >= plainly_above;
+                    },
+                sized = [&](const Result&r) { return r.cell == cell && r.sigmas.has_value(); };
+    double hours = 0;
+    for (const Result& r : results) hours += null(r) ? r.hours : 0;
+    const auto of = std::find_if(results.begin(), results.end(), null);
+    const bool held_out = of != results.end() && of->held_out;
+    text += fmt::format("| {}{} | {:.1f} | {} | {} | {} | {} | {} |\n", cell, held_out ? "" : " (development)", hours,
+                        share(results, null, [](const Result& r) { return r.named; }),
+                        share(results, fault, [](const Result& r) { return r.detected; }),
+                        share(results, fault, [](const Result& r) { return r.first_right; }),
+                        share(results, fault, [](const Result& r) { return r.named && !r.first_right; }),
+                        share(results, sized, [](const Result& r) { return std::abs(*r.sigmas) <= 2; }));
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string table_of(const std::vector<Result>& results) {
+  std::string text = "\n| figure | development cells | held-out cells |\n|---|---|---|\n";
+  const auto row = [&](const char* name, const Which& counts, const Which& yes) {
+    text += fmt::format("| {} |", name);
+    for (const bool held_out : {false, true})
+      text += " " +
+              share(
+                  results, [&](const Result& r) { return r.held_out == held_out && counts(r); }, yes) +
+              " |";
+    text += "\n";
+  };
+  const Which healthy = [](const Result&r) { return r.fault.empty(); }, named = [](const Result&r) { return r.named; },
+              right = [](const Result&r) { return r.first_right; },
+              wrong = [](const Result&r) { return r.named && !r.first_right; };
+  const auto verdict = [](std::string_view what) -> Which {
+    return [what](const Result& r) { return r.verdict == what; };
+  };
+  const auto limits = [](double low, double high) -> Which {
+    return [=](const Result& r) {
+      return !r.fault.empty() && r.over_limit && *r.over_limit >= low && *r.over_limit < high;
+    };
+  };
+  const double no_end = std::numeric_limits<double>::infinity();
+  text += fmt::format("| healthy, left out | {} | {} |\n", hours_of(results, false), hours_of(results, true));
+  row("a cause is named", healthy, named);
+  row("UNKNOWN", healthy, verdict("UNKNOWN"));
+  row("not enough healthy data, or not testable", healthy, verdict("NOT_TESTABLE"));
+  row("data fault", healthy, verdict("DATA_FAULT"));
+  row("fault of twice its detection limit and above: first name right", limits(plainly_above, no_end), right);
+  row("the same: detected", limits(plainly_above, no_end), [](const Result& r) { return r.detected; });
+  row("the same: another name first", limits(plainly_above, no_end), wrong);
+  row("of half to twice the limit: first name right", limits(0.5, plainly_above), right);
+  row("of half the limit and below: another name first", limits(0, plainly_below), wrong);
+  row(
+      "without a limit: another name first", [](const Result& r) { return !r.fault.empty() && !r.over_limit; }, wrong);
+  row(
+      "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
+      [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
+  text += by_cell(results);
+  double slowest_s = 0;
+  for (const Result& r : results) slowest_s = std::max(slowest_s, r.wall_s);
+  return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
+}
+
+std::string json_of(const std::vector<Result>& results) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const Result& r : results) {
+    list.push_back({{"set", r.set},
+                    {"cell", r.cell},
+                    {"fault", r.fault},
+                    {"size", r.size},
+                    {"held_out", r.held_out},
+                    {"verdict", r.verdict},
+                    {"found", r.found},
+                    {"withheld", r.withheld},
+                    {"over_limit", r.over_limit ? nlohmann::ordered_json(*r.over_limit) : nlohmann::ordered_json()},
+                    {"first_right", r.first_right},
+                    {"sigmas", r.sigmas ? nlohmann::ordered_json(*r.sigmas) : nlohmann::ordered_json()},
+                    {"error_v", r.error_v},
+                    {"remaining_v", r.remaining_v},
+                    {"wall_s", r.wall_s}});
+  }
+  return list.dump(1) + "\n";
+}
+
+std::string line_of(const SemiRealResult& r) {
+  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}\n", r.set,
+                     r.fault.empty() ? "(healthy)" : r.fault, r.size,
+                     r.over_limit ? fmt::format("{:.2g} L", *r.over_limit) : "-", r.verdict, 1e3 * r.error_v,
+                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld);
+}
+
+}  // namespace bms::benchmark

@@ -1,0 +1,27 @@
+// The results of the semi-real benchmark and their tables.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace bms::benchmark {
+
+/// One diagnosis.
+struct SemiRealResult {
+  std::string set, cell, fault;  ///< fault empty: a null
+  bool held_out = false;
+  double size = 0;
+  std::string verdict, found, withheld;
+  bool detected = false, first_right = false, named = false;
+  std::optional<double> over_limit;  ///< size over the stated detection limit
+  std::optional<double> sigmas;      ///< of the found size from the true one
+  double error_v = 0, remaining_v = 0, wall_s = 0, hours = 0;
+};
+
+std::string line_of(const SemiRealResult& r);
+/// Figures of all development and held-out cells, and of each cell.
+std::string table_of(const std::vector<SemiRealResult>& results);
+std::string json_of(const std::vector<SemiRealResult>& results);
+
+}  // namespace bms::benchmark
