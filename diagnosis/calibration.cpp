@@ -63,10 +63,10 @@ HatFunctions Calibration::hat_functions(std::vector<double> knots, Sigma sigma) 
   return made;
 }
 
-void Calibration::add_ocv(const model::CellParameters<>& cell, SocRange range) {
+void Calibration::add_ocv(const model::CellParameters<>& cell, SocRange range, const LearnedError& learned) {
   const double ocv_v = std::max(cell.tolerance.ocv_v, calibration_limits.ocv_at_least_v);
-  ocv_ =
-      hat_functions(even_knots(range.low, range.high, calibration_limits.ocv_knots_soc), [&](double) { return ocv_v; });
+  ocv_ = hat_functions(even_knots(range.low, range.high, calibration_limits.ocv_knots_soc),
+                       [&](double soc) { return learned.known() ? learned.at(soc) : ocv_v; });
   const auto& ocv = cell.ocv;
   for (std::size_t k = 1; k + 1 < ocv.soc.size; ++k) {
     const double bend = std::abs(ocv.b1_v[k] - ocv.b1_v[k - 1]),
@@ -141,10 +141,10 @@ void Calibration::add_record(const model::CellParameters<>& cell, const Prepared
 }
 
 Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch,
-                         const Loosened& loosened)
+                         const Loosened& loosened, const LearnedError& learned)
     : offset_a_(std::min(cell.noise.current_offset_a, calibration_limits.offset_at_most_c * cell.capacity_ah)) {
   const SocRange range = counted_range(cell, records);
-  add_ocv(cell, range);
+  add_ocv(cell, range, learned);
   add_resistances(cell, range);
   ocv_.loosen(loosened.ocv);
   r0_.loosen(loosened.r0);

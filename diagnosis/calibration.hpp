@@ -5,7 +5,8 @@
 // % is not missing physics. Each unknown has a standard normal prior; its size in the model is its standard deviation
 // (Thresholds::Calibration):
 //
-//   OCV         hat functions over soc, tolerance.ocv_v; and one at each sharp corner of the table: a smooth curve cuts
+//   OCV         hat functions over soc, tolerance.ocv_v or what was learned (learned_error.hpp); and one at each sharp
+//   corner of the table: a smooth curve cuts
 //               a corner of straight lines by its change of slope times some soc
 //   R0, R1, C1  hat functions over soc, 1, 2 and 4 times tolerance.resistance_fraction, or the identification's own
 //               standard deviation if that is larger; more beyond the table's nodes, where it is only extrapolated:
@@ -24,6 +25,7 @@
 #include <vector>
 
 #include "diagnosis/dual.hpp"
+#include "diagnosis/learned_error.hpp"
 #include "diagnosis/prepared_recording.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "model/cell_parameters.hpp"
@@ -106,7 +108,7 @@ class Calibration {
 
   /// records: one at least, none empty. branch: each recording has a branch position of its own.
   Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch = false,
-              const Loosened& loosened = {});
+              const Loosened& loosened = {}, const LearnedError& learned = {});
 
   /// Number of unknowns: the OCV's first, those of single recordings last.
   std::size_t size() const { return size_; }
@@ -206,7 +208,7 @@ class Calibration {
   static SocRange counted_range(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
   template <class Sigma>
   HatFunctions hat_functions(std::vector<double> knots, Sigma sigma);
-  void add_ocv(const model::CellParameters<>& cell, SocRange range);
+  void add_ocv(const model::CellParameters<>& cell, SocRange range, const LearnedError& learned);
   void add_resistances(const model::CellParameters<>& cell, SocRange range);
   void add_record(const model::CellParameters<>& cell, const PreparedRecording& r);
   model::OcvTable<double> moved_ocv(const model::OcvTable<double>& ocv, const std::vector<double>& u) const;

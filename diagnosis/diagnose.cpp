@@ -51,7 +51,8 @@ std::vector<DetectionLimit> detection_limits(LikelihoodModel& likelihood, const 
   const Screen screen(likelihood, control, scope.searched);
   std::vector<DetectionLimit> limits;
   for (const Candidate& c : screen.candidates()) {
-    if (c.limit > 0) limits.push_back({c.mechanism, 0, c.limit});
+    const DetectionLimit limit{c.mechanism, 0, c.limit};
+    if (c.limit > 0 && is_reachable(limit, likelihood.cell().capacity_ah)) limits.push_back(limit);
   }
   return limits;
 }
@@ -220,7 +221,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   d.cell = cell;
   if (has_data_fault(records, d)) return d;
 
-  LikelihoodModel likelihood = likelihood_model_of(cell, own, std::move(records));
+  LikelihoodModel likelihood = likelihood_model_of(cell, own, std::move(records), options.healthy.regimes);
   if (is_uninformative(likelihood, d)) return d;
   const Scope scope = scope_of(likelihood);
   d.not_testable = scope.not_testable;

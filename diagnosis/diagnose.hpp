@@ -16,7 +16,7 @@ namespace bms::diagnosis {
 
 struct Options {
   std::size_t most_mechanisms = 6;
-  measurement::HealthyData healthy;  ///< of the cell; if it is not known, nothing is withheld
+  measurement::HealthyData healthy;  ///< of the cell; if it is not known, nothing is withheld, but its regimes hold
   bool learns = false;  ///< the recordings are healthy: Diagnosis::unknown_gain is the larger one of that with
                         ///< and that without the findings
   double false_alarm_rate = 0.01;  ///< with `healthy`: how often a healthy recording may be blamed

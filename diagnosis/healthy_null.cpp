@@ -22,8 +22,11 @@ double student_tail(double t, double freedom) {
   return t > 0 ? half : 1 - half;
 }
 
-/// Probability that one more value of a normal sample of n lies so many of its standard deviations above its mean.
-double predictive_tail(double deviations, double n) { return student_tail(deviations / std::sqrt(1 + 1 / n), n - 1); }
+/// Probability that one more value of a normal sample of n lies so many of its standard deviations above its mean. The
+/// standard deviation has a prior that counts as so many more values.
+double predictive_tail(double deviations, double n) {
+  return student_tail(deviations / std::sqrt(1 + 1 / n), n - 1 + healthy_limits.spread_counts);
+}
 
 /// ln of each block's gain over the usual level of the cause on the other blocks; the largest of all causes.
 std::vector<double> largest_log_ratios(const std::vector<measurement::HealthyBlock>& blocks) {
@@ -59,8 +62,9 @@ HealthyNull::HealthyNull(const measurement::HealthyData& healthy, double rate, d
   level_of_block_ = largest_log_ratios(blocks_);
   const auto n = static_cast<double>(blocks());
   for (const double level : level_of_block_) mean_ += level / n;
-  for (const double level : level_of_block_) spread_ += (level - mean_) * (level - mean_);
-  spread_ = std::max(std::sqrt(spread_ / std::max(n - 1, 1.0)), healthy_limits.log_spread_at_least);
+  double squares = healthy_limits.spread_counts * healthy_limits.log_spread * healthy_limits.log_spread;
+  for (const double level : level_of_block_) squares += (level - mean_) * (level - mean_);
+  spread_ = std::sqrt(squares / (healthy_limits.spread_counts + std::max(n - 1, 0.0)));
 }
 
 double HealthyNull::gain_of(std::size_t block, const std::string& cause) const {

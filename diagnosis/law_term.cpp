@@ -67,7 +67,8 @@ using BlockErrors = std::vector<measurement::MeanSquare>;
 void add_left_out(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loosened, const Folds& folds,
                   std::size_t fold, BlockErrors& errors) {
   const Hypothesis base = all.base();
-  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), folds, fold), nominal, loosened);
+  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), folds, fold), nominal, loosened,
+                             all.learned());
   const HypothesisFit fit = kept.fit(base);
   for (std::size_t r = 0; r < all.records().size(); ++r) {
     const std::vector<double> volts = kept.voltage(fit.hypothesis, fit.calibration, r);
@@ -123,7 +124,7 @@ Loosened loosened(const TableLaw& law, double times) {
 
 model::CellParameters<> cell_with_term(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loose) {
   const Hypothesis base = all.base();
-  const LikelihoodModel free(all.cell(), base.settings, all.records(), nominal, loose);
+  const LikelihoodModel free(all.cell(), base.settings, all.records(), nominal, loose, all.learned());
   const HypothesisFit fit = free.fit(base);
   return free.calibration().applied(all.cell(),
                                     {fit.calibration.data(), fit.calibration.data() + fit.calibration.size()});

@@ -27,13 +27,14 @@ bool has_own_branch(const std::vector<MechanismSetting>& own, const std::vector<
 
 LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
                                  std::vector<PreparedRecording> records, const NoiseModel& noise,
-                                 const Loosened& loosened)
+                                 const Loosened& loosened, const LearnedError& learned)
     : cell_(cell),
       tables_(model::prepare<double, model::max_intervals>(cell)),
       own_(std::move(own)),
       records_(std::move(records)),
       facts_(recording_facts(cell, records_)),
-      calibration_(cell, records_, has_own_branch(own_, records_), loosened) {
+      learned_(learned),
+      calibration_(cell, records_, has_own_branch(own_, records_), loosened, learned) {
   for (const PreparedRecording& r : records_) {
     if (r.size() < 2) throw std::invalid_argument("a recording with fewer than two rows");
     samples_ += r.size();
@@ -61,7 +62,9 @@ void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
     if (k > 0) more.white_v2[k - 1] = std::max(more.white_v2[k - 1], more.white_v2[k]);
     more.edge_v2[k] = std::pow(noise_limits.edge_error * cell_.tolerance.resistance_fraction * r0_ohm * step_a, 2);
     if (k > 0) soc = std::clamp(soc + row.moved_soc, 0.0, 1.0);
-    more.slow_v2[k] = std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2);
+    more.slow_v2[k] =
+        std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2) + learned_.more_at(soc);
+    more.white_v2[k] += std::pow(noise_limits.white_share_of_ocv, 2) * learned_.more_at(soc);
   });
 }
 

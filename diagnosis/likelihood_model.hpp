@@ -17,6 +17,7 @@
 
 #include "diagnosis/calibration.hpp"
 #include "diagnosis/hypothesis.hpp"
+#include "diagnosis/learned_error.hpp"
 #include "diagnosis/noise.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/prepared_recording.hpp"
@@ -44,13 +45,15 @@ class LikelihoodModel {
  public:
   /// own: mechanisms of the cell file. A record with fewer than two rows: std::invalid_argument.
   LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
-                  std::vector<PreparedRecording> records, const NoiseModel& noise, const Loosened& loosened = {});
+                  std::vector<PreparedRecording> records, const NoiseModel& noise, const Loosened& loosened = {},
+                  const LearnedError& learned = {});
 
   const model::CellParameters<>& cell() const { return cell_; }
   const std::vector<PreparedRecording>& records() const { return records_; }
   const RecordingFacts& facts() const { return facts_; }
   const Calibration& calibration() const { return calibration_; }
   const NoiseModel& noise() const { return noise_; }
+  const LearnedError& learned() const { return learned_; }
   /// Rows of a residual: one per reading, record after record, then one per check of an instrument
   /// (PreparedRecording::checks).
   std::size_t samples() const { return samples_ + checks_; }
@@ -133,6 +136,7 @@ class LikelihoodModel {
   std::vector<MechanismSetting> own_;
   std::vector<PreparedRecording> records_;
   RecordingFacts facts_;
+  LearnedError learned_;
   Calibration calibration_;
   NoiseModel noise_;
   std::vector<Whitener> whiteners_;        ///< by record

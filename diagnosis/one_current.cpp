@@ -19,7 +19,8 @@ constexpr std::array<std::size_t, sizeof...(M)> indices = {model::mechanism_inde
 /// Each changes the charge that is counted, the drop of the voltage, or both.
 constexpr auto alike_at_one_current =
     indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange,
-            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation>;
+            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation, model::TemperatureResistance,
+            model::ChargeTransfer>;
 
 bool contains(const std::vector<std::size_t>& list, std::size_t m) {
   return std::find(list.begin(), list.end(), m) != list.end();
@@ -28,12 +29,16 @@ bool contains(const std::vector<std::size_t>& list, std::size_t m) {
 }  // namespace
 
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
+  double largest_a = current_limits.moving_c * capacity_ah / loaded_at_one_current;
+  for (const PreparedRecording& r : records) {
+    for (const double a : r.current_a) largest_a = std::isfinite(a) ? std::max(largest_a, std::abs(a)) : largest_a;
+  }
   std::vector<double> loaded_a;
   std::size_t edges = 0;
   for (const PreparedRecording& r : records) {
     for (std::size_t k = 0; k < r.size(); ++k) {
       const double a = r.current_a[k];
-      if (std::abs(a) > current_limits.moving_c * capacity_ah) loaded_a.push_back(a);
+      if (std::abs(a) > loaded_at_one_current * largest_a) loaded_a.push_back(a);
       if (k > 0 && std::abs(a - r.current_a[k - 1]) > current_limits.edge_c * capacity_ah) ++edges;
     }
   }

@@ -13,6 +13,10 @@
 
 namespace bms::diagnosis {
 
+/// Of the largest current, above which a row is loaded here: an offset of the sensor makes every rest look like a small
+/// load, and must not hide that there is one current.
+inline constexpr double loaded_at_one_current = 0.3;
+
 /// Returns true if nearly all load has one current in one direction, switched on or off only a few times.
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);
 

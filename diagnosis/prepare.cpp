@@ -21,13 +21,16 @@ NoiseModel nominal_noise(const std::vector<PreparedRecording>& records, const mo
 
 LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
                                     const std::vector<model::MechanismSetting>& own,
-                                    std::vector<PreparedRecording> records) {
-  const NoiseModel noise = nominal_noise(records, cell);
+                                    std::vector<PreparedRecording> records,
+                                    const std::vector<measurement::HealthyRegime>& regimes) {
+  const LearnedError learned(regimes, cell, records);
+  const model::CellParameters<> judged = learned.applied(cell);
+  const NoiseModel noise = nominal_noise(records, judged);
   for (PreparedRecording& r : records) {
     const double at_most_a = thresholds.denoising.noise_times_file * cell.noise.current_a;
     r.current_a = denoise_current(r.current_a, std::min(current_noise(r.current_a), at_most_a));
   }
-  return {cell, own, std::move(records), noise};
+  return {judged, own, std::move(records), noise, {}, learned};
 }
 
 }  // namespace bms::diagnosis

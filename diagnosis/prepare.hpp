@@ -14,9 +14,11 @@ namespace bms::diagnosis {
 /// White noise as measured in the voltages, fast and slow noise from the cell file's tolerance.
 NoiseModel nominal_noise(const std::vector<PreparedRecording>& records, const model::CellParameters<>& cell);
 
-/// records: checked, their bad readings removed (recording_check.hpp). own: mechanisms of the cell file.
+/// records: checked, their bad readings removed (recording_check.hpp). own: mechanisms of the cell file. regimes:
+/// errors of healthy recordings.
 LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
                                     const std::vector<model::MechanismSetting>& own,
-                                    std::vector<PreparedRecording> records);
+                                    std::vector<PreparedRecording> records,
+                                    const std::vector<measurement::HealthyRegime>& regimes = {});
 
 }  // namespace bms::diagnosis

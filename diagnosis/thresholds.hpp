@@ -302,16 +302,23 @@ struct Thresholds {
 
   /// Comparison with healthy recordings of the same cell (healthy_null.hpp).
   struct Healthy {
-    double log_spread_at_least = 0.5;  ///< standard deviation, in ln, of the gain on healthy blocks: that of the
-                                       ///< square of an effect that differs by a quarter. A few blocks may agree by
-                                       ///< chance
-    double block_h = 0.5;              ///< [h] expected of a block, without any block
-    double blocks_at_least = 3;        ///< for a Student distribution
-    double soc_beyond = 0.05;          ///< soc beyond that of the healthy blocks which they still stand for
-    double temperature_beyond_k = 5;   ///< [K]
-    double current_beyond = 1.25;      ///< times their largest current
-    double covered_at_least = 0.5;     ///< share of a recording's rows that the healthy blocks stand for
-    double gross_times = 2;            ///< RMS error over the largest of a healthy block, above which it is gross
+    double log_spread = 0.5;          ///< standard deviation, in ln, of the gain on healthy blocks: that of the
+                                      ///< square of an effect that differs by a quarter. A few blocks may agree by
+                                      ///< chance
+    double block_h = 0.5;             ///< [h] expected of a block, without any block
+    double spread_counts = 1;         ///< as if so many more blocks had shown log_spread. With 1 false alarms keep
+                                      ///< their rate up to a spread of 1.5; pooled over 17 sets of NASA B0005, B0007
+                                      ///< and B0025 it is 0.48
+    double blocks_at_least = 3;       ///< for a Student distribution
+    double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
+    double temperature_beyond_k = 5;  ///< [K]
+    double current_beyond = 1.25;     ///< times their largest current
+    double covered_at_least = 0.5;    ///< share of a recording's rows that the healthy blocks stand for
+    double error_times = 1.5;         ///< of the RMS error of healthy recordings: a few know it to a third
+    double error_at_least_v = 5e-4;   ///< [V]
+    double learned_within = 0.95;     ///< share of a recording's rows where healthy ones were, from which their error
+                                      ///< takes the place of the cell file's tolerance
+    double gross_times = 2;           ///< RMS error over the largest of a healthy block, above which it is gross
   };
 
   /// Tolerances of an extended cell file are widened by one of these factors (model_tolerance.hpp).

@@ -14,6 +14,9 @@ namespace bms::diagnosis {
 /// Gain of every mechanism that was added or has survived.
 std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivors);
 
+/// Returns true if a value of the parameter is as large as its limit: others would never be named.
+bool is_reachable(const DetectionLimit& limit, double capacity_ah);
+
 /// Gain of an unknown cause, on the scale of a mechanism's gain.
 double unknown_gain(const ResidualTest& residual);
 

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "diagnosis/healthy_block.hpp"
+#include "diagnosis/recording_check.hpp"
 #include "files/bad_input.hpp"
 #include "workflow/diagnose_recordings.hpp"
 #include "workflow/residual_regimes.hpp"
@@ -103,9 +104,11 @@ class Learning {
     double total_s = 0;
     for (const Recording& r : recordings_) total_s += r.duration_s();
     const double block_s = std::max(shortest_block_s, total_s / blocks_wanted);
-    for (std::size_t n = 0; n < recordings_.size(); ++n) learn(n, block_s);
+    for (std::size_t n = 0; n < recordings_.size(); ++n) add_blocks(n, block_s);
+    std::vector<char> usable;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) usable.push_back(diagnose(b) ? 1 : 0);
     data_.known = true;
-    data_.regimes = regimes_.regimes();
+    if (!data_.blocks.empty()) data_.regimes = regimes_.regimes(usable);
     for (measurement::HealthyRegime& r : data_.regimes) {
       for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v}) *v = in_short(*v);
     }
@@ -113,7 +116,14 @@ class Learning {
   }
 
  private:
-  void learn(std::size_t n, double block_s) {
+  /// A part of a recording, and a cell that was identified without it.
+  struct Block {
+    std::size_t recording = 0;
+    diagnosis::PreparedRecording record;
+    files::CellFile cell;
+  };
+
+  void add_blocks(std::size_t n, double block_s) {
     const Recording& whole = recordings_[n];
     const std::string& path = options_.healthy[n];
     IdentifyOptions without = options_;
@@ -132,7 +142,7 @@ class Learning {
           without.left_out = {whole.time_s[rows.first], whole.time_s[rows.first + rows.count - 1]};
           again = identified(without);
         }
-        add_block(whole, rows, again ? *again : cell_);
+        add_block(n, rows, again ? *again : cell_);
       }
     } catch (const FailedFit& failed) {
       warn(whole, failed.what());
@@ -151,21 +161,37 @@ class Learning {
     warnings_.push_back({"healthy", fmt::format("{}: not used as healthy data: {}", r.path, why)});
   }
 
-  void add_block(const Recording& whole, const Rows& rows, const files::CellFile& cell) {
+  void add_block(std::size_t n, const Rows& rows, const files::CellFile& cell) {
+    const Recording& whole = recordings_[n];
     Recording recording = part_of(whole, rows);
     const std::string name = std::filesystem::path(whole.path).filename().string();
     const StartSoc start = start_of_block(options_, whole, recording, cell);
-    const diagnosis::PreparedRecording record = prepared(std::move(recording), name, cell, start).record;
+    Block block{n, prepared(std::move(recording), name, cell, start).record, cell};
+    diagnosis::PreparedRecording checked = block.record;
+    diagnosis::check_recording(checked, cell.parameters);  // removes bad readings
+    regimes_.add_block(checked, diagnosis::predict(cell.parameters, cell.mechanisms, checked),
+                       cell.parameters.capacity_ah);
+    blocks_.push_back(std::move(block));
+  }
+
+  /// The errors of a block are judged by those of the other recordings or, of a single one, of its other blocks.
+  bool diagnose(std::size_t b) {
+    const auto& [n, record, cell] = blocks_[b];
+    std::vector<char> others;
+    for (std::size_t k = 0; k < blocks_.size(); ++k)
+      others.push_back((recordings_.size() > 1 ? blocks_[k].recording != n : k != b) ? 1 : 0);
     diagnosis::Options options;
     options.learns = true;
+    options.healthy.regimes = regimes_.regimes(others);
     const diagnosis::Diagnosis d = diagnosis::diagnose(cell.parameters, cell.mechanisms, {record}, options);
     if (!diagnosis::is_usable_as_healthy(d)) {
-      warnings_.push_back({"healthy", fmt::format("{}: {:.0f} to {:.0f} s not used as healthy data: {}", whole.path,
-                                                  record.time_s.front(), record.time_s.back(), d.statement)});
-      return;
+      warnings_.push_back(
+          {"healthy", fmt::format("{}: {:.0f} to {:.0f} s not used as healthy data: {}", recordings_[n].path,
+                                  record.time_s.front(), record.time_s.back(), d.statement)});
+      return false;
     }
     data_.blocks.push_back(diagnosis::healthy_block(record, d));
-    regimes_.add_block(record, d.views.front().base_v, cell.parameters.capacity_ah);
+    return true;
   }
 
   const IdentifyOptions& options_;
@@ -174,7 +200,8 @@ class Learning {
   std::vector<measurement::Warning>& warnings_;
   std::vector<Recording> recordings_;
   measurement::HealthyData data_;
-  ResidualRegimes regimes_;
+  std::vector<Block> blocks_;
+  ResidualRegimes regimes_;  ///< of all blocks
 };
 
 }  // namespace

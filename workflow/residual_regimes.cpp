@@ -59,10 +59,11 @@ void ResidualRegimes::add_block(const diagnosis::PreparedRecording& record, cons
   });
 }
 
-std::vector<measurement::HealthyRegime> ResidualRegimes::regimes() const {
+std::vector<measurement::HealthyRegime> ResidualRegimes::regimes(const std::vector<char>& kept) const {
   std::map<std::pair<std::size_t, std::size_t>, std::vector<Sum>> all;
-  for (const auto& block : blocks_) {
-    for (const auto& [place, sum] : block) all[place].push_back(sum);
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    if (!kept.empty() && kept[b] == 0) continue;
+    for (const auto& [place, sum] : blocks_[b]) all[place].push_back(sum);
   }
   std::vector<measurement::HealthyRegime> list;
   for (const auto& [place, sums] : all) {

@@ -18,7 +18,8 @@ class ResidualRegimes {
                  double capacity_ah);
 
   /// Ranges that any block has visited.
-  std::vector<measurement::HealthyRegime> regimes() const;
+  /// Of all blocks, or of those that are kept: as long as there are blocks.
+  std::vector<measurement::HealthyRegime> regimes(const std::vector<char>& kept = {}) const;
 
  private:
   struct Sum {

@@ -8,6 +8,7 @@
 
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/healthy_block.hpp"
+#include "diagnosis/learned_error.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/texts.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
@@ -55,7 +56,8 @@ TEST(HealthyNull, ACauseThatHealthyRecordingsNeverShowNeedsLess) {
 
 TEST(HealthyNull, WithFewBlocksItSaysHowManyHoursWouldDo) {
   const HealthyNull few(blocks_of_offset({300, 200, 400}), 0.01, 3'600);
-  const HealthyComparison c = few.compare("voltage_offset", 6'000);
+  EXPECT_TRUE(few.compare("voltage_offset", 6'000).stands_out);
+  const HealthyComparison c = few.compare("voltage_offset", 1'500);
   EXPECT_FALSE(c.stands_out);
   ASSERT_TRUE(c.hours_needed.has_value());
   EXPECT_GT(*c.hours_needed, 3);
@@ -81,6 +83,44 @@ TEST(HealthyNull, TheGainNeededIsTheSmallestThatStandsOut) {
   EXPECT_TRUE(null.compare("voltage_offset", 1.01 * *needed).stands_out);
   EXPECT_FALSE(null.compare("voltage_offset", 0.99 * *needed).stands_out);
   EXPECT_FALSE(HealthyNull(blocks_of_offset({300, 200}), 0.01, 3'600).gain_needed("voltage_offset").has_value());
+}
+
+measurement::HealthyRegime regime(const char* axis, double from, double to, double rms_v) {
+  return {.axis = axis, .from = from, .to = to, .hours = 1, .bias_v = 0, .rms_v = rms_v, .spread_v = 0};
+}
+
+/// Good to 2 mV between 20 and 100 %, to 80 mV near empty, in a discharge at 0.8C.
+std::vector<measurement::HealthyRegime> of_discharges() {
+  return {regime("soc", 0, 0.1, 0.08),  regime("soc", 0.1, 0.2, 0.01),       regime("soc", 0.2, 0.6, 0.002),
+          regime("soc", 0.6, 1, 0.002), regime("current_c", 0, 0.05, 0.003), regime("current_c", 0.5, 1, 0.003)};
+}
+
+PreparedRecording discharge(double current_a) {
+  std::vector<double> profile(60, 0.0);
+  profile.insert(profile.end(), 2'000, current_a);
+  return test::recorded(profile, 0.95, 1);
+}
+
+TEST(LearnedError, TakesThePlaceOfAWideTolerance) {
+  model::CellParameters<> cell = test::table9();
+  cell.tolerance.ocv_v = 0.04;
+  cell.tolerance.resistance_fraction = 0.3;
+  const LearnedError learned(of_discharges(), cell, {discharge(-4.8)});
+  ASSERT_TRUE(learned.known());
+  EXPECT_LT(learned.at(0.5), 0.004);
+  EXPECT_GT(learned.at(0.02), 0.08);
+  EXPECT_NEAR(learned.more_at(0.5), 0, 1e-9);
+  EXPECT_DOUBLE_EQ(learned.applied(cell).tolerance.ocv_v, learned.at(0.5));
+  EXPECT_LT(learned.applied(cell).tolerance.resistance_fraction, 0.2);
+}
+
+TEST(LearnedError, HoldsNeitherElsewhereNorAgainstANarrowTolerance) {
+  model::CellParameters<> cell = test::table9();
+  EXPECT_FALSE(LearnedError(of_discharges(), cell, {discharge(-4.8)}).known()) << "the file promises 1.5 mV";
+  cell.tolerance.ocv_v = 0.04;
+  EXPECT_FALSE(LearnedError(of_discharges(), cell, {discharge(-2)}).known()) << "no healthy recording had 0.3C";
+  EXPECT_FALSE(LearnedError({}, cell, {discharge(-4.8)}).known());
+  EXPECT_EQ(LearnedError({}, cell, {discharge(-4.8)}).applied(cell).tolerance.ocv_v, 0.04);
 }
 
 TEST(HealthyNull, AHighRateIsDecidedByRank) {
@@ -224,9 +264,14 @@ TEST(DiagnoseWithHealthy, WithoutAnyUsableBlockNothingIsBlamed) {
 TEST(DiagnoseWithHealthy, AGoodModelStaysWithoutMismatch) {
   Options options;
   options.healthy = learned(4);
+  for (HealthyBlock& b : options.healthy.blocks) b.gains.push_back({"voltage_offset", 1e7});
   const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(test::drive(0.5, 203), 0.7, 203)}, options);
   EXPECT_EQ(d.verdict, Verdict::no_mismatch);
   EXPECT_TRUE(d.withheld.empty());
+  EXPECT_FALSE(d.limits.empty());
+  EXPECT_THAT(d.limits, testing::Not(testing::Contains(
+                            testing::Field(&DetectionLimit::mechanism, model::mechanism_index("voltage_offset")))))
+      << "a limit that no offset reaches";
 }
 
 }  // namespace

@@ -24,6 +24,9 @@ std::vector<double> discharge(double current_a, std::size_t seconds) {
 
 TEST(OneCurrent, ADischargeHasItAndADriveOrASquareWaveHasNot) {
   EXPECT_TRUE(has_one_current({test::recorded(discharge(-6, 3'000), 0.95, 1)}, capacity_ah));
+  PreparedRecording with_offset = test::recorded(discharge(-6, 3'000), 0.95, 1);
+  for (double& a : with_offset.current_a.edit()) a += 0.8;
+  EXPECT_TRUE(has_one_current({with_offset}, capacity_ah)) << "an offset at rest is not a second load";
   EXPECT_FALSE(has_one_current({test::recorded(test::drive(1, 2), 0.8, 2)}, capacity_ah));
   std::vector<double> square;
   for (int k = 0; k < 40; ++k) square.insert(square.end(), 60, k % 2 == 0 ? -6 : 0);
