@@ -121,14 +121,15 @@ TEST_F(Tool, AReplayOfASimulatedProfileReproducesItsStateOfCharge) {
   EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
   const ToolRun run = run_tool("replay " + path("s.csv") + " --initial-soc 0.95 --json -");
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  // the voltage is the model's own, written with ten digits and read in microvolts, so the filter corrects nothing
+  // The voltage is the model's own, written with ten digits and read in microvolts. The first one moves the start a
+  // little, since what an earlier load may have left is not the same above and below 95 %.
   std::smatch found;
   ASSERT_TRUE(std::regex_search(run.out, found, std::regex("\"prediction_rmse_v\": ([-0-9.e]+)")));
-  EXPECT_LT(std::stod(found[1]), 2e-6);
+  EXPECT_LT(std::stod(found[1]), 2e-5);
 }
 
 /// A mechanism gives the same voltage from a cell file and from the command line. A replay with the same cell corrects
-/// nothing.
+/// nothing but the start, as above.
 TEST_F(Tool, AMechanismFromACellFileOrFromTheCommandLineIsSimulatedAndReplayed) {
   const std::string cell = write(
       "e.toml", content(BMS_SOURCE_DIR "/model/cells/table9.toml") +
@@ -151,7 +152,7 @@ TEST_F(Tool, AMechanismFromACellFileOrFromTheCommandLineIsSimulatedAndReplayed) 
   ASSERT_EQ(replay.exit_code, 0) << replay.err;
   std::smatch found;
   ASSERT_TRUE(std::regex_search(replay.out, found, std::regex("\"prediction_rmse_v\": ([-0-9.e]+)")));
-  EXPECT_LT(std::stod(found[1]), 1e-5);
+  EXPECT_LT(std::stod(found[1]), 3e-5);
   ASSERT_TRUE(std::regex_search(replay.out, found, std::regex("\"open_loop_rmse_v\": ([-0-9.e]+)")));
   EXPECT_LT(std::stod(found[1]), 1e-8);
   EXPECT_TRUE(content(path("t.csv"))
