@@ -206,7 +206,7 @@ class Matrix {
     BoardTruck truck(k + 40, result);
     if (!truck.drive_off()) return truck.complain("does not start to drive");
     // an estimator that still searches for its state of charge rejects no voltage
-    for (int t = 0; k == implausible && t < 300'000 && truck.flags != 0; t += step_ms) truck.step();
+    for (int t = 0; k == implausible && t < 3'600'000 && truck.flags != 0; t += step_ms) truck.step();
     if (const auto ms = reaction(
             k, truck, [&](auto& s, auto& e, auto&) { bring_about(k, level(k, true), truck, s, e); }, result))
       result.rows[k].above.add(*ms);
