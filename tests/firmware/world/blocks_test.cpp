@@ -180,8 +180,8 @@ TEST(Blocks, EndInTheStateOfSingleInstructionsBitForBit) {
 }
 
 /// The ways differ in the moment within a run in which a register is read, and in what they count. That can be a sample
-/// in the sequence of the contactors.
-TEST(Blocks, SwitchTheContactorsAsSingleInstructionsWithinASample) {
+/// when the sequence of the contactors begins, and another one where it waits for two samples in a row.
+TEST(Blocks, SwitchTheContactorsAsSingleInstructionsWithinTwoSamples) {
   TruckWorld by_blocks(pack_of(6).image, typical_setup(pack_of(6)));
   TruckWorld by_instructions(pack_of(6).image, typical_setup(pack_of(6)));
   by_instructions.board.by_instructions = true;
@@ -192,7 +192,7 @@ TEST(Blocks, SwitchTheContactorsAsSingleInstructionsWithinASample) {
   for (std::size_t k = 0; k < one.size(); ++k) {
     EXPECT_EQ(one[k].relay, other[k].relay) << k;
     EXPECT_EQ(one[k].closes, other[k].closes) << k;
-    EXPECT_NEAR(one[k].at_s, other[k].at_s, 0.105) << k;
+    EXPECT_NEAR(one[k].at_s, other[k].at_s, 0.205) << k;
   }
   for (std::size_t id = 0; id < by_blocks.vehicle.frames.size(); ++id)
     EXPECT_NEAR(by_blocks.vehicle.frames[id], by_instructions.vehicle.frames[id], 1) << id;
