@@ -6,12 +6,12 @@ namespace bms::diagnosis::pack {
 
 namespace {
 
-constexpr const PackThresholds::Noise& n = limits.noise;
+constexpr const PackThresholds::Noise& of_noise = limits.noise;
 
 bool is_allowed(const NoiseModel& tried, double NoiseModel::*part, std::span<const double> time_s) {
   if (part == &NoiseModel::slow_s)
     return tried.slow_s >= 2 * tried.fast_s && tried.slow_s <= time_s.back() - time_s.front();
-  return part == &NoiseModel::edge || (tried.*part >= n.least_v && tried.*part <= n.most_v);
+  return part == &NoiseModel::edge || (tried.*part >= of_noise.least_v && tried.*part <= of_noise.most_v);
 }
 
 }  // namespace
@@ -20,7 +20,7 @@ NoiseModel search_noise(const NoiseModel& start, std::span<const double> time_s,
                         const std::function<double(const NoiseModel&)>& cost_of) {
   NoiseModel best = start;
   double cost = cost_of(best);
-  for (const double factor : n.factors) {
+  for (const double factor : of_noise.factors) {
     for (bool moved = true; moved;) {
       moved = false;
       for (double NoiseModel::*part :

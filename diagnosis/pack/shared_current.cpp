@@ -19,7 +19,7 @@ namespace bms::diagnosis::pack {
 
 namespace {
 
-constexpr const PackThresholds::Shared& shared = limits.shared;
+constexpr const PackThresholds::Shared& of_shared = limits.shared;
 
 enum Unknown : Eigen::Index {
   start,
@@ -48,15 +48,15 @@ double or_zero(double value) { return std::isfinite(value) ? value : 0; }
 
 Unknowns healthy_of(const Track& t) {
   Unknowns u = Unknowns::Constant(t.ocv_tolerance_v / std::numbers::sqrt2);
-  u[start] = shared.start_soc;
-  u[sensor_offset] = shared.healthy_offset_c * t.capacity_ah;
-  u[sensor_gain] = shared.healthy_gain;
-  u[all_capacity] = shared.healthy_capacity;
-  u[all_resistance] = shared.resistance;
-  u[all_polarisation] = shared.polarisation;
-  u[warmth] = shared.per_k;
+  u[start] = of_shared.start_soc;
+  u[sensor_offset] = of_shared.healthy_offset_c * t.capacity_ah;
+  u[sensor_gain] = of_shared.healthy_gain;
+  u[all_capacity] = of_shared.healthy_capacity;
+  u[all_resistance] = of_shared.resistance;
+  u[all_polarisation] = of_shared.polarisation;
+  u[warmth] = of_shared.per_k;
   u[level] = t.ocv_tolerance_v;
-  for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = shared.resistance_wave;
+  for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = of_shared.resistance_wave;
   return u;
 }
 
@@ -98,7 +98,7 @@ struct Around {
 };
 
 double slope_at(const Track& t, double soc) {
-  const double reach = shared.slope_reach;
+  const double reach = of_shared.slope_reach;
   return (model::look_up(t.cell, soc + reach).ocv_v - model::look_up(t.cell, soc - reach).ocv_v) / (2 * reach);
 }
 
@@ -139,7 +139,7 @@ Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const 
   for (std::size_t k = 0; k < blocks; ++k) {
     set_row(p, u, k, soc[k], v_rc_v[k], columns);
     const double hours = (p.blocks.time_s[k] - p.pack.time_s.front()) / 3'600;
-    const double axis2 = shared.soc_axis * shared.soc_axis + shared.soc_walk * shared.soc_walk * hours;
+    const double axis2 = of_shared.soc_axis * of_shared.soc_axis + of_shared.soc_walk * of_shared.soc_walk * hours;
     const double slope_v = columns(static_cast<Eigen::Index>(k), start);
     a.rows.slow_v2[k] = axis2 * slope_v * slope_v;
     a.residual_v.push_back(columns(static_cast<Eigen::Index>(k), unknowns));
@@ -162,7 +162,7 @@ Unknowns most_probable(const Around& a, const Unknowns& prior) {
 
 Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
   Around best = around(p, from, prior, noise);
-  for (int i = 0; i < shared.iterations; ++i) {
+  for (int i = 0; i < of_shared.iterations; ++i) {
     const Unknowns step = most_probable(best, prior) - best.u;
     const double before = best.cost;
     double share = 1;
@@ -185,10 +185,11 @@ Unknowns starting_point(const Problem& p) {
   Unknowns best = Unknowns::Zero();
   double least = std::numeric_limits<double>::infinity();
   // a step of the search moves the charge at the end by little
-  const double hours_all = (p.pack.time_s.back() - p.pack.time_s.front()) / 3'600, most_c = shared.most_offset_c,
-               step_c = most_c / std::ceil(most_c * hours_all / shared.search_soc);
+  const double hours_all = (p.pack.time_s.back() - p.pack.time_s.front()) / 3'600, most_c = of_shared.most_offset_c,
+               step_c = most_c / std::ceil(most_c * hours_all / of_shared.search_soc);
   for (double offset_c = -most_c; offset_c <= most_c + step_c / 2; offset_c += step_c) {
-    for (double z = -shared.most_start; z <= shared.most_start + shared.start_step / 2; z += shared.start_step) {
+    for (double z = -of_shared.most_start; z <= of_shared.most_start + of_shared.start_step / 2;
+         z += of_shared.start_step) {
       Eigen::Matrix2d normal = Eigen::Matrix2d::Identity() * std::numeric_limits<double>::epsilon();
       Eigen::Vector2d right = Eigen::Vector2d::Zero();
       double square = 0;
@@ -232,19 +233,19 @@ std::vector<double> factor_of(const Problem& p, const Unknowns& u, const std::ve
     double f = 1 + u[all_resistance] + u[warmth] * warmer_k[k];
     for (Eigen::Index w = 0; w < PackThresholds::Shared::resistance_waves; ++w)
       f += u[resistance_wave_1 + w] * std::cos(std::numbers::pi * static_cast<double>(w + 1) * soc[k]);
-    factor.push_back(std::max(shared.least_factor, f));
+    factor.push_back(std::max(of_shared.least_factor, f));
   }
   return factor;
 }
 
 std::string reason_not_to_test(const Track& t, const PackRecording& pack) {
   for (std::size_t k = 1; k < pack.rows(); ++k) {
-    if (pack.time_s[k] - pack.time_s[k - 1] > shared.longest_gap_s)
+    if (pack.time_s[k] - pack.time_s[k - 1] > of_shared.longest_gap_s)
       return "Not tested: the recording has gaps, in which the charge is unknown.";
   }
-  if (pack.time_s.back() - pack.time_s.front() < shared.least_hours * 3'600)
+  if (pack.time_s.back() - pack.time_s.front() < of_shared.least_hours * 3'600)
     return "Not tested: the recording is too short.";
-  if (t.step_s > shared.longest_step_s) return "Not tested: the rows are too far apart.";
+  if (t.step_s > of_shared.longest_step_s) return "Not tested: the rows are too far apart.";
   std::size_t finite = 0;
   for (const double v : t.neighbours_v) finite += std::isfinite(v) ? 1 : 0;
   if (2 * finite < pack.rows()) return "Not tested: most readings are missing or held.";
@@ -283,9 +284,9 @@ PackFinding finding_for(const Around& a, const Unknowns& healthy, const Hypothes
 std::optional<PackFinding> judge(const Problem& p, const Around& a) {
   const double q = p.track.capacity_ah;
   std::array<Hypothesis, 3> list = {{
-      {sensor_offset, Cause::current_offset, shared.fault_offset_c * q, shared.least_offset_c * q, 0},
-      {sensor_gain, Cause::current_gain, shared.fault_gain, shared.least_gain, 0},
-      {all_capacity, Cause::all_capacity, shared.fault_capacity, shared.least_capacity, 0},
+      {sensor_offset, Cause::current_offset, of_shared.fault_offset_c * q, of_shared.least_offset_c * q, 0},
+      {sensor_gain, Cause::current_gain, of_shared.fault_gain, of_shared.least_gain, 0},
+      {all_capacity, Cause::all_capacity, of_shared.fault_capacity, of_shared.least_capacity, 0},
   }};
   for (Hypothesis& h : list) h.gain = gain_of(a, p.healthy, h.unknown, h.fault);
   std::stable_sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.gain > y.gain; });
@@ -293,7 +294,7 @@ std::optional<PackFinding> judge(const Problem& p, const Around& a) {
   const double needed = std::log(static_cast<double>(list.size()) / limits.fault_prior) + limits.least_odds;
   PackFinding f = finding_for(a, p.healthy, best);
   if (best.gain < needed || std::abs(f.value) < best.least || std::abs(f.value) < limits.least_sigmas * f.sigma ||
-      (best.cause == Cause::all_capacity && std::abs(f.value) > shared.most_capacity))
+      (best.cause == Cause::all_capacity && std::abs(f.value) > of_shared.most_capacity))
     return std::nullopt;
   double sum = 1 + std::exp(needed - limits.least_odds - best.gain);
   for (std::size_t k = 1; k < list.size(); ++k) {
@@ -320,8 +321,8 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
                   .blocks = Blocks(track, pack),
                   .healthy = healthy_of(track)};
   Unknowns wide = p.healthy;
-  wide[sensor_offset] = shared.fault_offset_c * track.capacity_ah;
-  NoiseModel noise{.white_v = shared.white_v, .fast_v = shared.fast_v, .slow_v = shared.slow_v};
+  wide[sensor_offset] = of_shared.fault_offset_c * track.capacity_ah;
+  NoiseModel noise{.white_v = of_shared.white_v, .fast_v = of_shared.fast_v, .slow_v = of_shared.slow_v};
   Around best;
   for (const Unknowns& from : {Unknowns(Unknowns::Zero()), starting_point(p)}) {
     const Around first = fit_from(p, from, wide, noise);
@@ -336,7 +337,7 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
   s.offset_a = best.u[sensor_offset];
   s.offset_sigma_a =
       finding_for(best, p.healthy,
-                  {sensor_offset, Cause::current_offset, shared.fault_offset_c * track.capacity_ah, 0, 0})
+                  {sensor_offset, Cause::current_offset, of_shared.fault_offset_c * track.capacity_ah, 0, 0})
           .sigma;
   s.gain = best.u[sensor_gain];
   return s;
