@@ -266,6 +266,17 @@ class Battery {
     return relative([](const Entry& e) { return e.verdict == "UNKNOWN" ? std::nullopt : e.capacity; });
   }
 
+  Issue compared(std::size_t c, const char* cause, const std::vector<Reading>& readings) const {
+    Issue issue;
+    issue.truck = cell(c).truck;
+    issue.cell_index = cell(c).cell_index;
+    issue.cause = cause;
+    issue.by_comparison = true;
+    issue.cell = c;
+    issue.of = readings.size();
+    return issue;
+  }
+
   void judge_discharge(std::size_t c, const std::vector<Reading>& readings, double scatter,
                        std::vector<Issue>& issues) const {
     constexpr double least_scatter = 5e-4;
@@ -273,14 +284,8 @@ class Battery {
     if (!onset || onset->per_day >= 0) return;
     const double lost = -onset->per_day * (readings.back().day - onset->day + 1);
     if (lost < least_discharge) return;
-    Issue issue;
-    issue.truck = cell(c).truck;
-    issue.cell_index = cell(c).cell_index;
-    issue.cause = "leakage";
-    issue.by_comparison = true;
-    issue.cell = c;
+    Issue issue = compared(c, "leakage", readings);
     issue.entry = cell(c).entries.size() - 1;
-    issue.of = readings.size();
     issue.seen = static_cast<std::size_t>(
         std::count_if(readings.begin(), readings.end(), [&](const Reading& r) { return r.day >= onset->day; }));
     issue.p_value = onset->p_value;
@@ -295,13 +300,7 @@ class Battery {
   void judge_weak(std::size_t c, const std::vector<Reading>& readings, std::vector<Issue>& issues) const {
     const auto mean = mean_of(readings);
     if (!mean || mean->value < least_loss) return;
-    Issue issue;
-    issue.truck = cell(c).truck;
-    issue.cell_index = cell(c).cell_index;
-    issue.cause = "capacity_change";
-    issue.by_comparison = true;
-    issue.cell = c;
-    issue.of = readings.size();
+    Issue issue = compared(c, "capacity_change", readings);
     issue.seen = static_cast<std::size_t>(
         std::count_if(readings.begin(), readings.end(), [](const Reading& r) { return r.value > least_loss; }));
     issue.p_value = std::erfc(mean->value / (std::sqrt(2.0) * std::hypot(mean->sigma, capacities_differ))) / 2;

@@ -8,6 +8,7 @@
 
 #include <Eigen/Cholesky>
 
+#include "diagnosis/pack/damped_fit.hpp"
 #include "diagnosis/pack/noise_search.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 
@@ -229,20 +230,9 @@ Vector starting_point(const FitInput& input, double lag_s) {
 }
 
 CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior, const NoiseModel& noise) {
-  CellFit fit = around(input, start, prior, noise);
-  for (int i = 0; i < limits.fit.iterations; ++i) {
-    const Vector step = most_probable(fit.all(), prior) - fit.theta;
-    const double before = fit.cost;
-    double share = 1;
-    bool better = false;
-    for (int h = 0; h <= limits.fit.halvings && !better; ++h, share /= 2) {
-      CellFit next = around(input, fit.theta + share * step, prior, noise);
-      better = next.cost < fit.cost;
-      if (better) fit = std::move(next);
-    }
-    if (!better || before - fit.cost < limits.fit.converged) break;
-  }
-  return fit;
+  const auto at = [&](const Vector& theta) { return around(input, theta, prior, noise); };
+  return damped_fit(at(start), &CellFit::theta, limits.fit.iterations, at,
+                    [&](const CellFit& fit) { return most_probable(fit.all(), prior); });
 }
 
 NoiseModel noise_of(const FitInput& input, const CellFit& fit) {

@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "diagnosis/noise.hpp"
+#include "diagnosis/pack/damped_fit.hpp"
 #include "diagnosis/pack/noise_search.hpp"
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
@@ -161,20 +162,9 @@ Unknowns most_probable(const Around& a, const Unknowns& prior) {
 }
 
 Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
-  Around best = around(p, from, prior, noise);
-  for (int i = 0; i < of_shared.iterations; ++i) {
-    const Unknowns step = most_probable(best, prior) - best.u;
-    const double before = best.cost;
-    double share = 1;
-    bool better = false;
-    for (int h = 0; h <= limits.fit.halvings && !better; ++h, share /= 2) {
-      Around next = around(p, best.u + share * step, prior, noise);
-      better = next.cost < best.cost;
-      if (better) best = std::move(next);
-    }
-    if (!better || before - best.cost < limits.fit.converged) break;
-  }
-  return best;
+  const auto at = [&](const Unknowns& u) { return around(p, u, prior, noise); };
+  return damped_fit(at(from), &Around::u, of_shared.iterations, at,
+                    [&](const Around& fit) -> Unknowns { return most_probable(fit, prior); });
 }
 
 /// A coarse search over start and offset: the OCV bends, and a fit may end where another one is better.
