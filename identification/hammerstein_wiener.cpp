@@ -145,11 +145,6 @@ std::vector<double> InputCurve::through(std::span<const double> current_a) const
   return u;
 }
 
-double OutputCurve::by_corner(double w_v, std::size_t k) const {
-  const double at = (w_v - w_from_v) / w_step_v;
-  return corner_weight(Bends(at, y_v.size(), ramp), at, k);
-}
-
 double OutputCurve::through(double w_v) const {
   if (y_v.empty()) return w_v;
   const double at = (w_v - w_from_v) / w_step_v;

@@ -37,8 +37,6 @@ struct OutputCurve {
 
   double through(double w_v) const;
   double slope(double w_v) const;
-  /// dy / d y_v[k] at this w.
-  double by_corner(double w_v, std::size_t k) const;
 };
 
 struct HammersteinWiener {

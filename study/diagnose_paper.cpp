@@ -142,28 +142,48 @@ HeldOut held_out(const std::vector<Figure>& simulated, const std::vector<Figure>
   return out;
 }
 
-/// Each refit searches from the beginning: the optimum of all figures would know what is left out.
-/// only_table7: rows of other tables stay empty.
-std::vector<HeldOut> all_held_out(const model::CellParameters<>& cell, const Effects& effects,
-                                  const PaperDiagnosisOptions& options, bool only_table7) {
-  const PaperFit fit(cell, effects, options.published);
-  const std::vector<Split> splits = splits_of(fit.published());
-  std::vector<std::vector<Figure>> simulated(splits.size());
-  measurement::in_parallel(splits.size(), [&](std::size_t k) {
-    const std::vector<bool>& used = splits[k].used;
-    if (only_table7 && !splits[k].tables.front().starts_with("7")) return;
-    const bool without_table7 = !used.front() && !used[1];
-    simulated[k] = fit.simulate(fit.searched(used, without_table7 ? options.screening_points : 0, options.iterations));
-  });
-  std::vector<HeldOut> out;
-  for (std::size_t k = 0; k < splits.size(); ++k) {
-    for (const std::string& table : splits[k].tables) {
-      out.push_back(simulated[k].empty() ? HeldOut{table, splits[k].from, std::nullopt, std::nullopt, 0}
-                                         : held_out(simulated[k], fit.published(), table, splits[k]));
+/// What one candidate predicts of the figures that a refit did not see.
+class Predictions {
+ public:
+  /// only_table7: rows of other tables stay empty.
+  Predictions(const model::CellParameters<>& cell, const Effects& effects, const PaperDiagnosisOptions& options,
+              bool only_table7)
+      : fit_(cell, effects, options.published), options_(&options), splits_(splits_of(fit_.published())) {
+    simulated_.resize(splits_.size());
+    for (std::size_t k = 0; k < splits_.size(); ++k) {
+      if (!only_table7 || splits_[k].tables.front().starts_with("7")) wanted_.push_back(k);
     }
+    std::stable_partition(wanted_.begin(), wanted_.end(), [&](std::size_t k) { return without_table7(splits_[k]); });
   }
-  return out;
-}
+
+  /// The long ones first.
+  std::size_t refits() const { return wanted_.size(); }
+  /// Searches from the beginning: the optimum of all figures would know what is left out.
+  void refit(std::size_t number) {
+    const Split& split = splits_[wanted_[number]];
+    const int points = without_table7(split) ? options_->screening_points : 0;
+    simulated_[wanted_[number]] = fit_.simulate(fit_.searched(split.used, points, options_->iterations));
+  }
+  std::vector<HeldOut> results() const {
+    std::vector<HeldOut> out;
+    for (std::size_t k = 0; k < splits_.size(); ++k) {
+      for (const std::string& table : splits_[k].tables) {
+        out.push_back(simulated_[k].empty() ? HeldOut{table, splits_[k].from, std::nullopt, std::nullopt, 0}
+                                            : held_out(simulated_[k], fit_.published(), table, splits_[k]));
+      }
+    }
+    return out;
+  }
+
+ private:
+  static bool without_table7(const Split& split) { return !split.used.front() && !split.used[1]; }
+
+  PaperFit fit_;
+  const PaperDiagnosisOptions* options_;
+  std::vector<Split> splits_;
+  std::vector<std::vector<Figure>> simulated_;  ///< by split
+  std::vector<std::size_t> wanted_;             ///< splits, in the order of the refits
+};
 
 std::vector<Contradiction> contradictions_of(const std::vector<Figure>& simulated,
                                              const std::vector<Figure>& published) {
@@ -232,35 +252,65 @@ std::vector<Effects> all_effects() {
   return {both, slow_and_ocv, slow, hysteresis, none, {true, true, false, true}, {false, false, false, true}};
 }
 
-PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDiagnosisOptions& options) {
-  const auto begin = Clock::now();
-  std::vector<Fitted> all(options.candidates.size());
-  measurement::in_parallel(all.size(), [&](std::size_t k) { all[k] = fitted(cell, options.candidates[k], options); });
-  std::sort(all.begin(), all.end(), [](const Fitted& a, const Fitted& b) { return a.summary.score < b.summary.score; });
-  PaperDiagnosis d;
+namespace {
+
+bool is_plain(const Effects& e) { return !e.hysteresis && !e.slow_polarisation && !e.other_ocv && !e.whole_ocv; }
+
+void set_candidates(const std::vector<Fitted>& best_first, PaperDiagnosis& d) {
+  const double least = best_first.front().summary.score;
   double sum = 0;
-  for (const Fitted& f : all) sum += std::exp(all.front().summary.score - f.summary.score);
-  const Fitted* plain = nullptr;
-  for (Fitted& f : all) {
-    f.summary.weight = std::exp(all.front().summary.score - f.summary.score) / sum;
+  for (const Fitted& f : best_first) sum += std::exp(least - f.summary.score);
+  for (const Fitted& f : best_first) {
     d.candidates.push_back(f.summary);
-    if (!f.effects.hysteresis && !f.effects.slow_polarisation && !f.effects.other_ocv && !f.effects.whole_ocv)
-      plain = &f;
+    d.candidates.back().weight = std::exp(least - f.summary.score) / sum;
+    if (is_plain(f.effects)) d.plain = d.candidates.back();
   }
-  if (plain == nullptr) throw std::invalid_argument("no candidate without effects");
-  d.plain = plain->summary;
-  const Fitted& best = all.front();
-  const PaperFit fit(cell, best.effects, options.published);
-  const Eigen::VectorXd deviation = fit.deviation(best.x);
+}
+
+void set_physics(const PaperFit& fit, const Eigen::VectorXd& x, PaperDiagnosis& d) {
+  const Eigen::VectorXd deviation = fit.deviation(x);
   for (std::size_t k = 0; k < fit.unknowns().size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const PaperUnknown& u = fit.unknowns()[k];
-    d.physics.push_back({u.id, std::exp(best.x[at]), std::max(u.low, std::exp(best.x[at] - z * deviation[at])),
-                         std::min(u.high, std::exp(best.x[at] + z * deviation[at])), u.unit});
+    d.physics.push_back({u.id, std::exp(x[at]), std::max(u.low, std::exp(x[at] - z * deviation[at])),
+                         std::min(u.high, std::exp(x[at] + z * deviation[at])), u.unit});
   }
+}
+
+}  // namespace
+
+PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDiagnosisOptions& options) {
+  const auto begin = Clock::now();
+  const auto plain = std::find_if(options.candidates.begin(), options.candidates.end(), is_plain);
+  if (plain == options.candidates.end()) throw std::invalid_argument("no candidate without effects");
+  Predictions of_plain(cell, *plain, options, true);
+  std::vector<Fitted> all(options.candidates.size());
+  // the refits of the plain candidate do not wait for the best one
+  const std::size_t early = options.hold_out ? of_plain.refits() : 0;
+  measurement::in_parallel(early + all.size(), [&](std::size_t k) {
+    if (k < early) {
+      of_plain.refit(k);
+    } else {
+      all[k - early] = fitted(cell, options.candidates[k - early], options);
+    }
+  });
+  std::sort(all.begin(), all.end(), [](const Fitted& a, const Fitted& b) { return a.summary.score < b.summary.score; });
+  const Fitted& best = all.front();
+  PaperDiagnosis d;
+  set_candidates(all, d);
+  const PaperFit fit(cell, best.effects, options.published);
+  Predictions of_best(cell, best.effects, options, false);
+  const std::size_t late = options.hold_out ? of_best.refits() : 0;
+  measurement::in_parallel(late + 1, [&](std::size_t k) {
+    if (k < late) {
+      of_best.refit(k);
+    } else {
+      set_physics(fit, best.x, d);
+    }
+  });
   if (options.hold_out) {
-    d.held_out = all_held_out(cell, best.effects, options, false);
-    d.held_out_plain = all_held_out(cell, plain->effects, options, true);
+    d.held_out = of_best.results();
+    d.held_out_plain = of_plain.results();
   }
   d.simulated = best.simulated;
   d.contradictions = contradictions_of(best.simulated, fit.published());

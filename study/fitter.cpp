@@ -120,6 +120,7 @@ id::FitStatistics Fitter::validated(const id::Identification& found, const Study
 }
 
 void Fitter::step() {
+  const std::lock_guard lock(counting_);
   ++done_;
   if (progress_) progress_(done_, all_);
 }

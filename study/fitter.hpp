@@ -2,7 +2,7 @@
 #pragma once
 
 #include <array>
-#include <atomic>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -49,6 +49,7 @@ struct ModelFit {
   id::HammersteinWiener blocks;  ///< of the linear models
 };
 
+/// Several threads may use one at once.
 class Fitter {
  public:
   /// all: number of identifications that the study will make.
@@ -83,6 +84,7 @@ class Fitter {
 
   model::CellParameters<> cell_;
   std::size_t all_, done_ = 0;
+  std::mutex counting_;
   StudyProgress progress_;
 };
 

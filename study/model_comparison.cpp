@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "measurement/in_parallel.hpp"
 #include "study/study_tables.hpp"
 #include "study/table_cells.hpp"
 
@@ -10,6 +11,18 @@ namespace bms::study {
 namespace {
 
 using ModelFits = std::array<ModelFit, models>;
+
+/// By optimiser.
+using AllFits = std::array<ModelFits, methods.size()>;
+
+AllFits every_fit(Fitter& fitter, const StudyData& estimation, const StudyData& validation, Start start) {
+  AllFits fits;
+  measurement::in_parallel(models * methods.size(), [&](std::size_t k) {
+    const std::size_t m = k % methods.size(), model = models - 1 - k / methods.size();  // the slow ones first
+    fits[m][model] = fitter.fit(model, estimation, methods[m], validation, start);
+  });
+  return fits;
+}
 
 std::string without_id(const std::string& warning) {
   const std::size_t colon = warning.find(": ");
@@ -25,10 +38,11 @@ files::PageTable optimiser_table(Fitter& fitter, const StudyData& estimation, co
                          {"optimiser", model_names[0], model_names[1], model_names[2], model_names[3]},
                          {},
                          ""};
+  AllFits fits = every_fit(fitter, estimation, validation, Start::paper);
   for (std::size_t m = 0; m < methods.size(); ++m) {
     std::vector<files::PageCell> row = {label(method_names[m])};
     for (std::size_t k = 0; k < models; ++k) {
-      ModelFit fit = fitter.fit(k, estimation, methods[m], validation);
+      ModelFit& fit = fits[m][k];
       const auto paper = paper_number(with_paper, 4, m, k);
       if (!fit.usable) {
         row.push_back(failed("no result: " + fit.why_not, paper));
@@ -64,10 +78,10 @@ files::PageTable long_table(Fitter& fitter, const StudyData& estimation, const S
       "Start values: the equation error refined by Steiglitz and McBride and a grid of poles for the "
       "linear models, the rests for the grey box. What differs from the table above is the start, "
       "not the model."};
+  const AllFits fits = every_fit(fitter, estimation, validation, Start::search);
   for (std::size_t m = 0; m < methods.size(); ++m) {
     std::vector<files::PageCell> row = {label(method_names[m])};
-    for (std::size_t k = 0; k < models; ++k) {
-      const ModelFit fit = fitter.fit(k, estimation, methods[m], validation, Start::search);
+    for (const ModelFit& fit : fits[m]) {
       row.push_back(fit.usable ? percent_cell(fit.estimation.fit_percent) : failed("no result: " + fit.why_not));
       if (fit.usable && !fit.optimum.converged) row.back().text += " (not converged)";
     }

@@ -4,9 +4,7 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <Eigen/Dense>
 
-#include "identification/goodness_of_fit.hpp"
 #include "identification/rest_reading.hpp"
 #include "study/paper_tables.hpp"
 
@@ -15,7 +13,7 @@ namespace bms::study {
 namespace {
 
 constexpr std::array<const char*, 3> circuit = {"r0_ohm", "r1_ohm", "c1_f"};
-constexpr double read_soc = 0.8;
+constexpr double read_soc = 0.8, ocv_soc = 0.4;
 constexpr int scales = 3;
 
 /// What a source of the figures has to give, published or simulated.
@@ -82,89 +80,91 @@ TwoLevels levels_of(std::size_t experiment, const PulseDesigns& p) {
   return {high_a, high_s[k], high_a * (1 - p.swing), low_s[k], p.duration_s};
 }
 
-/// The paper estimates both initial states of every data set (3.2.4, 4.2, title of Table 8).
-id::DataSet with_free_states(const StudyData& part) {
-  id::DataSet set = data_set(part);
-  set.estimate_initial_soc = true;
-  return set;
+/// Everything of the cell and its instruments that data of any experiment depend on.
+std::vector<double> numbers_of(const Bench& b, std::uint64_t seed) {
+  return {static_cast<double>(seed), b.start_branch,     b.r0_factor,         b.r1_factor,       b.c1_factor,
+          b.left_out.half_gap_v,     b.left_out.decay,   b.left_out.slow_ohm, b.left_out.slow_s, b.voltage_noise_v,
+          b.current_noise_a,         b.current_offset_a, b.pulse_step_s,      b.ocv_step_s};
 }
 
-id::GreyBoxOptions one_node(double soc) {
-  id::GreyBoxOptions options;
-  options.soc_nodes = {soc};
-  options.one_start = true;
-  return options;
+void add(std::vector<double>& numbers, std::initializer_list<double> more) { numbers.insert(numbers.end(), more); }
+
+void add(std::vector<double>& numbers, const model::OcvTable<double>& ocv) {
+  for (std::size_t k = 0; k < ocv.b0_v.size; ++k) add(numbers, {ocv.soc[k + 1], ocv.b0_v[k], ocv.b1_v[k]});
 }
 
-/// The grey box of one data set, from the paper's start with its limit of iterations.
-struct FromData {
-  id::Identification found;
-  std::array<double, 3> unit_deviation{};  ///< of R0, R1, C1 for a white noise of 1 V in samples every second
-
-  FromData(const model::CellParameters<>& given, const StudyData& part) {
-    model::CellParameters<> start = given;
-    for (std::size_t k = 0; k < start.rc.soc.size; ++k) {
-      start.rc.r0_ohm[k] = paper_start.r0_ohm;
-      start.rc.r1_ohm[k] = paper_start.r1_ohm;
-      start.rc.c1_f[k] = paper_start.c1_f;
-    }
-    id::Stopping stopping;
-    stopping.iterations = paper_iterations;
-    stopping.cost = 1e-7;  // figures are printed with four digits
-    stopping.step = 1e-5;
-    found = id::identify_grey_box(start, {with_free_states(part)}, one_node(part.middle_soc()),
-                                  id::Method::trust_region_reflective, stopping);
-    set_deviation(part);
+/// The OCV test with ten minutes of rest, and what the paper has from it.
+PaperRuns::OcvTest ocv_test(const model::CellParameters<>& cell, const PaperCandidate& candidate, PlantRuns& plant) {
+  constexpr int steps = 10;
+  const StudyData test = run_ocv_test(steps, candidate.bench, candidate.seed, false, &plant);
+  PaperRuns::OcvTest out;
+  model::CellParameters<> given = cell;
+  given.ocv = id::even_pieces(points_of(id::rested_voltages(test.data, 1), id::OcvDirection::discharge));
+  for (std::size_t k = 0; candidate.other_ocv && k < given.ocv.b0_v.size; ++k) {
+    given.ocv.b0_v[k] = paper_table(1).at(k, 0);
+    given.ocv.b1_v[k] = paper_table(1).at(k, 1);
   }
+  out.ocv = given.ocv;
+  const StudyData estimation = window(test, "", 0.8, 0.5), validation = window(test, "", 0.5, 0.2);
+  const FromData from(given, estimation);
+  for (std::size_t k = 0; k < 3; ++k) out.circuit[k] = from.found().parameters[k].value;
+  out.estimation_fit = from.found().estimation.fit_percent;
+  out.validation_fit = from.fit_to(validation, {validation.soc_from, 0, 0, true});
+  out.appendix = appendix_of(test);
+  return out;
+}
 
-  /// Fit to other data, whose initial states are fitted from those that its own model has.
-  double fit_to(const StudyData& part, const id::InitialState& own) const {
-    const id::GreyBox grey_box(found.cell, {with_free_states(part)}, one_node(found.cell.rc.soc[0]));
-    const id::LeastSquares problem = grey_box.problem();
-    constexpr int steps = 3;              // the voltage is linear in v_rc and, within a piece of the OCV, in SOC
-    constexpr double same_points = 0.01;  // of a fit
-    Eigen::VectorXd x = grey_box.start(), residuals;
-    x.tail(2) = Eigen::Vector2d{own.v_rc_v, own.soc};
-    Eigen::MatrixXd jacobian;
-    if (!problem.evaluate(x, residuals, &jacobian)) return -INFINITY;
-    const Eigen::MatrixXd by_states = jacobian.rightCols(2);
-    const auto squares = (by_states.transpose() * by_states).completeOrthogonalDecomposition();
-    double best = percent(part, residuals);
-    for (int k = 0; k < steps; ++k) {
-      const Eigen::Vector2d step = squares.solve(by_states.transpose() * residuals);
-      x.tail(2) = (x.tail(2) - step).cwiseMax(problem.lower.tail(2)).cwiseMin(problem.upper.tail(2));
-      if (!problem.evaluate(x, residuals, nullptr)) break;
-      const double now = percent(part, residuals), before = best;
-      best = std::max(best, now);
-      if (now < before + same_points) break;
-    }
-    return best;
-  }
+const PaperRuns::OcvTest& ocv_test_of(const model::CellParameters<>& cell, const PaperCandidate& c, PaperRuns& runs) {
+  std::vector<double> numbers = numbers_of(c.bench, c.seed);
+  add(numbers, {c.bench.ocv_c_rate, c.other_ocv ? 1.0 : 0.0});
+  return runs.ocv_tests.of(numbers, [&] { return ocv_test(cell, c, runs.plant); });
+}
 
- private:
-  static double percent(const StudyData& part, const Eigen::VectorXd& residuals) {
-    id::FitFigure fit;
-    for (Eigen::Index row = 0; row < residuals.size(); ++row) {
-      const double v = part.data.voltage_v[static_cast<std::size_t>(row)];
-      fit.add(v, v + residuals[row]);
-    }
-    return fit.percent();
+/// The OCV as the line that it has at 40 %.
+model::OcvTable<double> line_at_40(model::OcvTable<double> ocv) {
+  const std::size_t at_40 = model::cell_detail::ocv_piece(ocv, ocv_soc - 0.05);
+  const double b0_v = ocv.b0_v[at_40], b1_v = ocv.b1_v[at_40];
+  for (std::size_t k = 0; k < ocv.b0_v.size; ++k) {
+    ocv.b0_v[k] = b0_v;
+    ocv.b1_v[k] = b1_v;
   }
+  return ocv;
+}
 
-  /// Parameters at a bound have a deviation here, too.
-  void set_deviation(const StudyData& part) {
-    const id::GreyBox grey_box(found.cell, {with_free_states(part)}, one_node(found.cell.rc.soc[0]));
-    Eigen::VectorXd residuals;
-    Eigen::MatrixXd jacobian;
-    if (!grey_box.problem().evaluate(found.optimum.x, residuals, &jacobian)) return;
-    const Eigen::VectorXd norm = jacobian.colwise().norm().cwiseMax(1e-300);
-    const Eigen::MatrixXd scaled = jacobian * norm.cwiseInverse().asDiagonal();
-    const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
-    const double step_s = part.data.time_s[1] - part.data.time_s[0];
-    for (Eigen::Index k = 0; k < 3; ++k)
-      unit_deviation[static_cast<std::size_t>(k)] = std::sqrt(std::max(0.0, inverse(k, k)) / step_s) / norm[k];
-  }
-};
+/// One of the six pulse designs.
+const FromData& from_pulses(const model::CellParameters<>& given, std::size_t k, const PaperCandidate& c,
+                            PaperRuns& runs) {
+  constexpr double pulse_soc = 0.41;
+  const std::uint64_t seed = c.seed + 1 + k;
+  const TwoLevels levels = levels_of(k, c.pulses);
+  std::vector<double> numbers = numbers_of(c.bench, seed);
+  add(numbers,
+      {static_cast<double>(k), levels.first_a, levels.first_s, levels.second_a, levels.second_s, levels.duration_s});
+  add(numbers, given.ocv);
+  return runs.identified.of(numbers, [&] {
+    return FromData(given, run_two_levels(experiment_names[k], levels, pulse_soc, c.bench, seed, runs.plant));
+  });
+}
+
+/// The part of the OCV test with rests of an hour around 40 %.
+const FromData& from_hour_rests(const model::CellParameters<>& given, const PaperCandidate& c, PaperRuns& runs) {
+  const std::uint64_t seed = c.seed + 1 + ocv_experiment;
+  std::vector<double> numbers = numbers_of(c.bench, seed);
+  add(numbers, {static_cast<double>(ocv_experiment), c.bench.ocv_c_rate, c.bench.low_share, c.ocv_half_window});
+  add(numbers, given.ocv);
+  return runs.identified.of(numbers, [&] {
+    Bench bench = c.bench;
+    bench.ocv_step_s *= 2;  // it lasts nine hours
+    const StudyData hour = run_on_bench(experiment_names[ocv_experiment], 1, bench, seed, 0.01, &runs.plant);
+    return FromData(given, window(hour, "", std::min(1.0, ocv_soc + c.ocv_half_window), ocv_soc - c.ocv_half_window));
+  });
+}
+
+double fit_of(const FromData& from, const FromData& other, PaperRuns& runs) {
+  const auto [at, is_new] = runs.fits.try_emplace({&from, &other}, 0);
+  if (is_new) at->second = from.fit_to(other.part(), other.found().initial.front());
+  return at->second;
+}
 
 /// Finite and of a size that a logarithm can have.
 double sane(double value) { return std::isfinite(value) ? std::max(value, 1e-9) : 1e-9; }
@@ -184,54 +184,25 @@ std::vector<Figure> published_figures() {
   return listed(s);
 }
 
-std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate, PlantRuns& runs) {
-  constexpr double pulse_soc = 0.41, ocv_soc = 0.4;
-  constexpr int ocv_steps = 10;
-  Bench bench = candidate.bench;
+std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate, PaperRuns& runs) {
   Source s;
-  const StudyData test = run_ocv_test(ocv_steps, bench, candidate.seed, false, &runs);
-  model::CellParameters<> given = cell;
-  model::OcvTable<double>& ocv = given.ocv;
-  ocv = id::even_pieces(points_of(id::rested_voltages(test.data, 1), id::OcvDirection::discharge));
-  if (candidate.other_ocv) {
-    for (std::size_t k = 0; k < ocv.b0_v.size; ++k) {
-      ocv.b0_v[k] = paper_table(1).at(k, 0);
-      ocv.b1_v[k] = paper_table(1).at(k, 1);
-    }
-  }
-  const StudyData estimation = window(test, "", 0.8, 0.5), validation = window(test, "", 0.5, 0.2);
-  const FromData from_test(given, estimation);
-  for (std::size_t k = 0; k < 3; ++k) s.ocv_circuit[k] = from_test.found.parameters[k].value;
-  s.estimation_fit = from_test.found.estimation.fit_percent;
-  s.validation_fit = from_test.fit_to(validation, {validation.soc_from, 0, 0, true});
-  s.appendix = appendix_of(test);
+  const PaperRuns::OcvTest& test = ocv_test_of(cell, candidate, runs);
+  s.ocv_circuit = test.circuit;
+  s.appendix = test.appendix;
+  s.estimation_fit = test.estimation_fit;
+  s.validation_fit = test.validation_fit;
 
-  std::vector<StudyData> parts;
-  for (std::size_t k = 0; k < ocv_experiment; ++k)
-    parts.push_back(run_two_levels(experiment_names[k], levels_of(k, candidate.pulses), pulse_soc, bench,
-                                   candidate.seed + 1 + k, runs));
-  const double from_soc = std::min(1.0, ocv_soc + candidate.ocv_half_window),
-               to_soc = ocv_soc - candidate.ocv_half_window;
-  bench.ocv_step_s *= 2;  // it lasts nine hours
-  const StudyData hour =
-      run_on_bench(experiment_names[ocv_experiment], 1, bench, candidate.seed + 1 + ocv_experiment, 0.01, &runs);
-  parts.push_back(window(hour, "", from_soc, to_soc));
-  if (!candidate.whole_ocv) {
-    const std::size_t at_40 = model::cell_detail::ocv_piece(ocv, ocv_soc - 0.05);
-    const double b0_v = ocv.b0_v[at_40], b1_v = ocv.b1_v[at_40];
-    for (std::size_t k = 0; k < ocv.b0_v.size; ++k) {
-      ocv.b0_v[k] = b0_v;
-      ocv.b1_v[k] = b1_v;
-    }
-  }
-  std::vector<FromData> identified;
-  for (const StudyData& part : parts) identified.emplace_back(given, part);
+  model::CellParameters<> given = cell;
+  given.ocv = candidate.whole_ocv ? test.ocv : line_at_40(test.ocv);
+  std::array<const FromData*, paper_experiments> identified{};
+  for (std::size_t k = 0; k < ocv_experiment; ++k) identified[k] = &from_pulses(given, k, candidate, runs);
+  identified[ocv_experiment] = &from_hour_rests(given, candidate, runs);
   for (std::size_t row = 0; row < paper_experiments; ++row) {
-    const FromData& from = identified[row];
-    const id::FitStatistics& own = from.found.estimation;
+    const FromData& from = *identified[row];
+    const id::FitStatistics& own = from.found().estimation;
     for (std::size_t k = 0; k < paper_experiments; ++k)
-      s.fit[row][k] = k == row ? own.fit_percent : from.fit_to(parts[k], identified[k].found.initial.front());
-    std::copy(from.unit_deviation.begin(), from.unit_deviation.end(), s.deviation[row].begin());
+      s.fit[row][k] = k == row ? own.fit_percent : fit_of(from, *identified[k], runs);
+    std::copy(from.unit_deviation().begin(), from.unit_deviation().end(), s.deviation[row].begin());
     s.deviation[row][3] = std::sqrt(own.output_variance_v2);
   }
   return listed(s);

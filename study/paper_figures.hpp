@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "study/observations.hpp"
+#include "study/paper_procedure.hpp"
 
 namespace bms::study {
 
@@ -51,7 +51,7 @@ struct PaperCandidate {
   double ocv_half_window = 0.1;
   std::uint64_t seed = 1;  ///< of the noise
 };
-std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate, PlantRuns& runs);
+std::vector<Figure> figures_of(const model::CellParameters<>& cell, const PaperCandidate& candidate, PaperRuns& runs);
 
 /// Differences as the fit sees them: logarithm of simulated over published, limited to +-2. Figures that share a factor
 /// are shifted to mean 0 first.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include <Eigen/Dense>
 
@@ -60,11 +61,11 @@ Eigen::VectorXd PaperFit::start() const {
 }
 
 std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x) const {
-  PlantRuns runs;
+  PaperRuns runs;
   return simulate(x, runs);
 }
 
-std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x, PlantRuns& runs) const {
+std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x, PaperRuns& runs) const {
   constexpr double ocv_step_s = 5;
   PaperCandidate candidate;
   candidate.other_ocv = effects_.other_ocv;
@@ -98,9 +99,10 @@ id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
     p.lower[k] = std::log(unknowns_[static_cast<std::size_t>(k)].low);
     p.upper[k] = std::log(unknowns_[static_cast<std::size_t>(k)].high);
   }
-  p.evaluate = [this, used](const Eigen::VectorXd& x, Eigen::VectorXd& r, Eigen::MatrixXd* jacobian) {
-    PlantRuns runs;  // the columns of the Jacobian share most of them
-    r = weighted(simulate(x, runs), used);
+  // the columns of the Jacobian share what their unknown does not change, and begin with the last point tried
+  p.evaluate = [this, used, runs = std::make_shared<PaperRuns>()](const Eigen::VectorXd& x, Eigen::VectorXd& r,
+                                                                  Eigen::MatrixXd* jacobian) {
+    r = weighted(simulate(x, *runs), used);
     if (jacobian == nullptr) return r.allFinite();
     jacobian->resize(r.size(), x.size());
     for (Eigen::Index k = 0; k < x.size(); ++k) {
@@ -108,8 +110,9 @@ id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
       const double step = x[k] + difference_step > top ? -difference_step : difference_step;
       Eigen::VectorXd moved = x;
       moved[k] += step;
-      jacobian->col(k) = (weighted(simulate(moved, runs), used) - r) / step;
+      jacobian->col(k) = (weighted(simulate(moved, *runs), used) - r) / step;
     }
+    *runs = {};
     return r.allFinite() && jacobian->allFinite();
   };
   return p;

@@ -27,7 +27,7 @@ class PaperFit {
   Eigen::VectorXd screened(int points, const std::vector<bool>& used) const;
   std::vector<Figure> simulate(const Eigen::VectorXd& x) const;
   /// The same with runs of the plant that other simulations may share.
-  std::vector<Figure> simulate(const Eigen::VectorXd& x, PlantRuns& runs) const;
+  std::vector<Figure> simulate(const Eigen::VectorXd& x, PaperRuns& runs) const;
 
   /// The better end of searches from the start and from the best screened point. There are several minima.
   Eigen::VectorXd searched(const std::vector<bool>& used, int points, int iterations) const;

@@ -117,15 +117,12 @@ TEST(HammersteinWiener, DerivativesAreThoseOfTheResiduals) {
   }
 }
 
-TEST(HammersteinWiener, TheOutputCurveIsTheSumOfItsCorners) {
-  OutputCurve curve{0, 1, {0, 0.8, 2.1, 2.9, 4.3, 5.0, 5.8, 7.2, 8.1, 8.8, 10}};
-  for (const double w : {-0.7, 0.5, 1.9, 2.0, 2.1, 5.26, 9.5, 10.4}) {
-    double sum = 0;
-    for (std::size_t k = 0; k < curve.y_v.size(); ++k) sum += curve.y_v[k] * curve.by_corner(w, k);
-    EXPECT_NEAR(sum, curve.through(w), 1e-12) << w;
+TEST(HammersteinWiener, TheOutputCurveIsStraightBetweenRoundedCorners) {
+  const OutputCurve curve{0, 1, {0, 0.8, 2.1, 2.9, 4.3, 5.0, 5.8, 7.2, 8.1, 8.8, 10}};
+  for (const double w : {-0.7, 0.5, 1.9, 2.0, 2.1, 5.26, 9.5, 10.4})
     EXPECT_NEAR(curve.slope(w), (curve.through(w + 1e-6) - curve.through(w - 1e-6)) / 2e-6, 1e-6) << w;
-  }
-  EXPECT_NEAR(curve.through(2.5), 2.5, 1e-12);  // straight between the rounded corners: (2.1 + 2.9) / 2
+  EXPECT_NEAR(curve.through(2.5), 2.5, 1e-12);  // (2.1 + 2.9) / 2
+  EXPECT_NEAR(curve.through(-1), -0.8, 1e-12);  // the first piece continues
 }
 
 void perturb(HammersteinWiener& m) {

@@ -7,6 +7,7 @@
 #include "files/cell_file.hpp"
 #include "study/diagnose_paper.hpp"
 #include "study/paper_consistency.hpp"
+#include "study/paper_fit.hpp"
 
 namespace bms::study {
 namespace {
@@ -25,7 +26,7 @@ std::vector<Figure> figures_of_another(double half_gap_v, double slow_ohm) {
   c.pulses = {.pulse_s = 16, .pulse_c_rate = 0.8, .high_c_rate = 0.5, .swing = 1.4, .duration_s = 1'000};
   c.ocv_half_window = 0.36;
   c.seed = 100;
-  PlantRuns runs;
+  PaperRuns runs;
   std::vector<Figure> figures = figures_of(files::read_cell("table9").parameters, c, runs);
   std::mt19937_64 random(1);
   for (Figure& f : figures) {
@@ -75,6 +76,25 @@ TEST(PaperDiagnosis, FindsAPlantedHysteresis) {
 TEST(PaperDiagnosis, FindsNothingWhereNothingIsPlanted) {
   const PaperDiagnosis d = diagnosed(figures_of_another(0, 0), {hysteresis, none});
   EXPECT_FALSE(d.candidates.front().effects.hysteresis) << value_of(d, "half_gap_v");
+}
+
+// Candidates that differ in one unknown share what it does not change, and nothing else.
+TEST(PaperFit, SharedRunsGiveTheSameFigures) {
+  const PaperFit fit(files::read_cell("table9").parameters, {true, true, false, false}, published_figures());
+  PaperRuns shared;
+  const Eigen::VectorXd start = fit.start();
+  const std::vector<Figure> first = fit.simulate(start, shared);
+  for (Eigen::Index k = 0; k < start.size(); ++k) {
+    Eigen::VectorXd moved = start;
+    moved[k] -= 0.05;
+    const std::vector<Figure> with = fit.simulate(moved, shared), alone = fit.simulate(moved);
+    std::size_t changed = 0;
+    for (std::size_t f = 0; f < alone.size(); ++f) {
+      EXPECT_EQ(with[f].value, alone[f].value) << fit.unknowns()[static_cast<std::size_t>(k)].id << ": " << f;
+      changed += alone[f].value != first[f].value ? 1U : 0U;
+    }
+    EXPECT_GT(changed, 0U) << fit.unknowns()[static_cast<std::size_t>(k)].id;
+  }
 }
 
 TEST(PaperConsistency, FollowsFromThePublishedFigures) {

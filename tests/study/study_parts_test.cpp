@@ -210,7 +210,7 @@ TEST(PaperFigures, DependOnTheEffects) {
   with.bench.start_branch = -1;
   PaperCandidate without = with;
   without.bench.left_out = {};
-  PlantRuns runs;
+  PaperRuns runs;
   const std::vector<Figure> a = figures_of(table9(), with, runs), b = figures_of(table9(), without, runs);
   double squares = 0;
   for (const double d : differences(b, a)) squares += d * d / static_cast<double>(a.size());
