@@ -188,7 +188,8 @@ HammersteinWiener with_unknowns(HammersteinWiener m, const VectorXd& x) {
 }
 
 HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const Structure& structure,
-                                           const model::OcvTable<double>& ocv, const Data& data, double soc) {
+                                           const model::OcvTable<double>& ocv, const Data& data, double soc,
+                                           const BeyondData& beyond) {
   HammersteinWiener m{structure, linear, {}, {}};
   m.input.one_c_a = data.capacity_ah;
   const VectorXd w = simulate(linear, data.current_a);
@@ -202,8 +203,8 @@ HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const St
     lowest = std::min(lowest, counted);
     highest = std::max(highest, counted);
   }
-  m.output.w_from_v = w_low;
-  m.output.w_step_v = std::max(1e-6, (w_high - w_low) / static_cast<double>(pieces));
+  m.output.w_step_v = std::max(1e-6, (w_high - w_low) / (static_cast<double>(pieces) - beyond.below - beyond.above));
+  m.output.w_from_v = w_low - beyond.below * m.output.w_step_v;
   const double half = (highest - lowest) / 2;
   const auto ocv_v = [&](double at) {
     const double inside = std::clamp(at, 0.0, 1.0);

@@ -52,10 +52,17 @@ Eigen::VectorXd simulate(const HammersteinWiener& model, std::span<const double>
 Eigen::VectorXd to_unknowns(const HammersteinWiener& model);
 HammersteinWiener with_unknowns(HammersteinWiener model, const Eigen::VectorXd& unknowns);
 
+/// How many pieces the curve on the output reaches beyond the range of w over the data. It decides where its corners
+/// lie, and from there a search does not move them by a piece.
+struct BeyondData {
+  double below = 0, above = 0;
+};
+
 /// A model around an identified linear block: f(i) = i, g with the shape of the OCV around `soc`, the middle of the
 /// data. Its corners enclose the range of w over the data.
 HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const Structure& structure,
-                                           const model::OcvTable<double>& ocv, const Data& data, double soc);
+                                           const model::OcvTable<double>& ocv, const Data& data, double soc,
+                                           const BeyondData& beyond = {});
 
 /// Simulation error, then the priors. Throws as simulation_error().
 LeastSquares simulation_error(const Data& data, const HammersteinWiener& start);

@@ -93,22 +93,59 @@ Searched search_linear(LinearKind kind, const model::CellParameters<>& cell, con
   return s;
 }
 
+/// The model with the curves fitted around its linear block.
+HammersteinWiener with_curves(HammersteinWiener m, const LeastSquares& problem, const Stopping& stopping) {
+  Eigen::VectorXd x = to_unknowns(m);
+  const auto first = static_cast<Eigen::Index>(m.structure.unknowns());
+  x.tail(x.size() - first) =
+      minimise(with_first_fixed(problem, x, first), x.tail(x.size() - first), Method::trust_region_reflective, stopping)
+          .x;
+  return with_unknowns(std::move(m), x);
+}
+
 /// Everything at once, and after the curves alone; the better of both ends.
-Searched search_curves(const Searched& linear, const model::CellParameters<>& cell, const Data& data, double soc,
-                       Method method, const Stopping& stopping) {
+Searched search_from(HammersteinWiener start, const Data& data, Method method, const Stopping& stopping) {
   Searched s;
-  s.blocks = begin_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc);
+  s.blocks = std::move(start);
   s.problem = simulation_error(data, s.blocks);
-  Eigen::VectorXd x = to_unknowns(s.blocks);
-  const auto first = static_cast<Eigen::Index>(s.blocks.structure.unknowns());
-  s.found = minimise(s.problem, x, method, stopping);
-  x.tail(x.size() - first) = minimise(with_first_fixed(s.problem, x, first), x.tail(x.size() - first),
-                                      Method::trust_region_reflective, stopping)
-                                 .x;
+  s.found = minimise(s.problem, to_unknowns(s.blocks), method, stopping);
+  const Eigen::VectorXd x = to_unknowns(with_curves(s.blocks, s.problem, stopping));
   Optimum staged = minimise(s.problem, x, method, stopping);
   if (staged.cost < s.found.cost) s.found = std::move(staged);
   s.blocks = with_unknowns(s.blocks, s.found.x);
   return s;
+}
+
+/// From the best end of short searches with the trust region method: each place of the corners leads to a minimum of
+/// its own.
+Searched search_from_best_place(const Searched& linear, const model::CellParameters<>& cell, const Data& data,
+                                double soc, Method method, const Stopping& stopping) {
+  Stopping few;
+  few.iterations = 40;
+  Searched best;
+  best.found.cost = INFINITY;
+  for (const double below : {0.0, 0.5, 1.0}) {
+    for (const double above : {0.0, 0.5, 1.0}) {
+      Searched s;
+      s.blocks =
+          begin_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc, {below, above});
+      s.problem = simulation_error(data, s.blocks);
+      const Eigen::VectorXd x = to_unknowns(with_curves(s.blocks, s.problem, few));
+      s.found = minimise(s.problem, x, Method::trust_region_reflective, few);
+      if (s.found.cost < best.found.cost) best = std::move(s);
+    }
+  }
+  best.found = minimise(best.problem, Eigen::VectorXd(best.found.x), method, stopping);
+  best.blocks = with_unknowns(best.blocks, best.found.x);
+  return best;
+}
+
+/// From a given start: without a search for the place of the corners.
+Searched search_curves(const Searched& linear, const model::CellParameters<>& cell, const Data& data, double soc,
+                       Method method, const LinearOptions& options) {
+  if (!options.start) return search_from_best_place(linear, cell, data, soc, method, options.stopping);
+  return search_from(begin_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc), data,
+                     method, options.stopping);
 }
 
 }  // namespace
@@ -119,7 +156,7 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
   const Data& data = even.data;
   const bool hw = kind == LinearKind::hammerstein_wiener;
   Searched s = search_linear(kind, cell, data, soc, hw ? Method::trust_region_reflective : method, options);
-  if (hw) s = search_curves(s, cell, data, soc, method, options.stopping);
+  if (hw) s = search_curves(s, cell, data, soc, method, options);
   LinearIdentification out;
   LinearModel& m = out.model;
   Identification& found = out.identification;

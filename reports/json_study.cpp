@@ -40,6 +40,10 @@ std::string json_of(const study::PaperDiagnosis& d) {
   for (const study::PaperPhysics& p : d.physics)
     json["physics"].push_back({{"id", p.id}, {"value", p.value}, {"low", p.low}, {"high", p.high}, {"unit", p.unit}});
   json["effects"] = d.candidates.front().effects.name();
+  for (const study::EffectVerdict& v : d.effects)
+    json["verdicts"].push_back({{"effect", v.effect},
+                                {"probability", v.probability},
+                                {"present", v.present ? Json(*v.present) : Json(nullptr)}});
   json["table7"] = match_of(d.candidates.front().table7);
   json["table7_without_effects"] = match_of(d.plain.table7);
   for (const study::HeldOut& h : d.held_out) json["held_out_tables"].push_back(held_out_of(h));

@@ -202,6 +202,38 @@ std::vector<Contradiction> contradictions_of(const std::vector<Figure>& simulate
   return out;
 }
 
+std::vector<EffectVerdict> verdicts_of(const std::vector<CandidateFit>& candidates) {
+  constexpr double sure = 0.95;
+  std::vector<EffectVerdict> verdicts;
+  for (const auto& [effect, has] :
+       {std::pair{"hysteresis", &Effects::hysteresis}, std::pair{"a slow polarisation", &Effects::slow_polarisation},
+        std::pair{"another OCV than its model", &Effects::other_ocv}}) {
+    double with = INFINITY, without = INFINITY;  // scores
+    for (const CandidateFit& c : candidates) {
+      double& least = c.effects.*has ? with : without;
+      least = std::min(least, c.score);
+    }
+    if (!std::isfinite(with) || !std::isfinite(without)) continue;
+    const double probability = 1 / (1 + std::exp(with - without));
+    EffectVerdict verdict{effect, probability, std::nullopt};
+    if (probability > sure) verdict.present = true;
+    if (probability < 1 - sure) verdict.present = false;
+    verdicts.push_back(verdict);
+  }
+  return verdicts;
+}
+
+/// What the figures ask for, and what they leave open.
+std::string verdict_text(const std::vector<EffectVerdict>& verdicts) {
+  std::string text;
+  for (const EffectVerdict& v : verdicts) {
+    const char* verb = "do not decide whether it has";
+    if (v.present) verb = *v.present ? "ask for" : "do not ask for";
+    text += fmt::format(" The figures {} {} (probability {:.2f}).", verb, v.effect, v.probability);
+  }
+  return text;
+}
+
 std::string statement_of(const PaperDiagnosis& d) {
   const CandidateFit& best = d.candidates.front();
   const bool reached = best.table7.rank_correlation >= 0.75 && best.table7.median_gap_points <= 6;
@@ -210,6 +242,7 @@ std::string statement_of(const PaperDiagnosis& d) {
       "median gap of {:.1f} points; the equations of the paper alone reach {:.2f} and {:.1f} points.",
       best.effects.name(), best.table7.rank_correlation, best.table7.median_gap_points, d.plain.table7.rank_correlation,
       d.plain.table7.median_gap_points);
+  text += verdict_text(d.effects);
   if (!reached) text += " Part of the pattern remains unexplained.";
   for (std::size_t k = 0; k < d.held_out.size() && k < d.held_out_plain.size(); ++k) {
     if (d.held_out[k].table != figure_group_names.front()) continue;
@@ -268,7 +301,7 @@ void set_candidates(const std::vector<Fitted>& best_first, PaperDiagnosis& d) {
 }
 
 void set_physics(const PaperFit& fit, const Eigen::VectorXd& x, PaperDiagnosis& d) {
-  const Eigen::VectorXd deviation = fit.deviation(x);
+  const Eigen::VectorXd deviation = fit.deviation(x, std::vector<bool>(fit.published().size(), true));
   for (std::size_t k = 0; k < fit.unknowns().size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const PaperUnknown& u = fit.unknowns()[k];
@@ -298,6 +331,7 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDi
   const Fitted& best = all.front();
   PaperDiagnosis d;
   set_candidates(all, d);
+  d.effects = verdicts_of(d.candidates);
   const PaperFit fit(cell, best.effects, options.published);
   Predictions of_best(cell, best.effects, options, false);
   const std::size_t late = options.hold_out ? of_best.refits() : 0;

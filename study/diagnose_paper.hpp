@@ -40,6 +40,13 @@ struct CandidateFit {
   Table7Match table7;
 };
 
+/// Whether the figures ask for an effect: the best candidate with it, compared with the best one without it.
+struct EffectVerdict {
+  std::string effect;
+  double probability = 0;       ///< if it was as likely as not before
+  std::optional<bool> present;  ///< missing: the figures do not decide it (5 to 95 %)
+};
+
 /// Figures that were left out of a fit, predicted.
 struct HeldOut {
   std::string table;  ///< "8"; or the half of Table 7
@@ -59,6 +66,7 @@ struct PaperDiagnosis {
   std::vector<CandidateFit> candidates;  ///< best first
   std::vector<PaperPhysics> physics;     ///< of the best
   CandidateFit plain;                    ///< the equations of the paper alone
+  std::vector<EffectVerdict> effects;
   std::vector<HeldOut> held_out;
   std::vector<HeldOut> held_out_plain;  ///< those of Table 7 by the equations of the paper alone; the others are empty
   std::vector<Contradiction> contradictions;

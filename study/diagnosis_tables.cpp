@@ -14,9 +14,9 @@ files::PageTable candidate_table(const PaperDiagnosis& d) {
       {"cell", "unknowns", "score", "weight", "Table 7: rank correlation", "without the diagonal",
        "median gap [points]"},
       {},
-      "Score: figures that count as independent (36) times the logarithm of their RMS difference, by "
-      "table, plus the penalty of Schwarz for the unknowns; smaller is better. Weight: exp(-score), as "
-      "a share."};
+      "Score: minus the logarithm of the likelihood, with an unknown variance for each table and 36 figures that count "
+      "as independent, plus the penalty of Schwarz for the unknowns; smaller is better. Weight: exp(-score), as a "
+      "share."};
   for (const CandidateFit& c : d.candidates) {
     table.rows.push_back({label(c.effects.name()), label(fmt::format("{}", c.unknowns)), number_cell(c.score),
                           number_cell(c.weight), number_cell(c.table7.rank_correlation),

@@ -12,13 +12,50 @@ namespace {
 
 constexpr double difference_step = 0.05;  // of a logarithm
 constexpr double screened_range = 0.7;    // of a logarithm, on either side of the start
-/// Differences that count as one standard deviation, by group: as large as those between two such experiments.
+/// By table: as large as those between two such experiments.
 constexpr std::array<double, 5> expected_difference = {0.3, 0.6, 0.5, 0.3, 0.5};
 
-std::array<double, 5> counts(const std::vector<Figure>& figures) {
-  std::array<double, 5> n{};
-  for (const Figure& f : figures) n[static_cast<std::size_t>(f.group)] += 1;
-  return n;
+/// The prior of a variance has the information of one figure, as the prior behind the penalty of Schwarz has.
+constexpr double prior_freedom = 1;
+
+std::size_t group_of(const Figure& f) { return static_cast<std::size_t>(f.group); }
+
+/// The figures of a table that a fit uses.
+struct UsedTable {
+  double figures = 0;      ///< number of them
+  double independent = 0;  ///< what they count as
+  double mean_square = 0;  ///< of their differences
+  double prior_v2 = 0;     ///< nu s^2
+
+  double cost() const { return 0.5 * (prior_freedom + independent) * std::log1p(independent * mean_square / prior_v2); }
+  /// Of a difference in a fit.
+  double weight() const { return std::sqrt(prior_freedom / prior_v2 * independent / figures); }
+  /// Of a difference, in standard deviations at the most likely variance.
+  double per_sigma() const {
+    return std::sqrt((prior_freedom + independent) / (prior_v2 + independent * mean_square) * independent / figures);
+  }
+};
+
+using UsedTables = std::array<UsedTable, 5>;
+
+UsedTables used_tables(const std::vector<double>& d, const std::vector<Figure>& figures,
+                       const std::vector<bool>& used) {
+  UsedTables tables;
+  std::array<double, tables.size()> all{};
+  for (std::size_t k = 0; k < d.size(); ++k) {
+    all[group_of(figures[k])] += 1;
+    if (!used[k]) continue;
+    UsedTable& table = tables[group_of(figures[k])];
+    table.figures += 1;
+    table.mean_square += d[k] * d[k];
+  }
+  for (std::size_t g = 0; g < tables.size(); ++g) {
+    UsedTable& table = tables[g];
+    table.independent = independent_figures[g] * table.figures / all[g];
+    table.mean_square /= std::max(1.0, table.figures);
+    table.prior_v2 = prior_freedom * expected_difference[g] * expected_difference[g];
+  }
+  return tables;
 }
 
 /// Element `index` of the sequence of van der Corput in a base: evenly spread over 0..1.
@@ -79,15 +116,27 @@ std::vector<Figure> PaperFit::simulate(const Eigen::VectorXd& x, PaperRuns& runs
 }
 
 Eigen::VectorXd PaperFit::weighted(const std::vector<Figure>& simulated, const std::vector<bool>& used) const {
-  const std::array<double, 5> n = counts(published_);
   const std::vector<double> d = differences(simulated, published_);
-  Eigen::VectorXd r(static_cast<Eigen::Index>(d.size()));
+  const UsedTables tables = used_tables(d, published_, used);
+  Eigen::VectorXd r = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(d.size()));
   for (std::size_t k = 0; k < d.size(); ++k) {
-    const auto group = static_cast<std::size_t>(published_[k].group);
-    const double weight = std::sqrt(independent_figures[group] / n[group]) / expected_difference[group];
-    r[static_cast<Eigen::Index>(k)] = used[k] ? weight * d[k] : 0;
+    if (used[k]) r[static_cast<Eigen::Index>(k)] = tables[group_of(published_[k])].weight() * d[k];
   }
   return r;
+}
+
+Eigen::MatrixXd PaperFit::derivatives(const Eigen::VectorXd& x, PaperRuns& runs,
+                                      const std::function<Eigen::VectorXd(const std::vector<Figure>&)>& of) const {
+  const Eigen::VectorXd here = of(simulate(x, runs));
+  Eigen::MatrixXd jacobian(here.size(), x.size());
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const double top = std::log(unknowns_[static_cast<std::size_t>(k)].high);
+    const double step = x[k] + difference_step > top ? -difference_step : difference_step;
+    Eigen::VectorXd moved = x;
+    moved[k] += step;
+    jacobian.col(k) = (of(simulate(moved, runs)) - here) / step;
+  }
+  return jacobian;
 }
 
 id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
@@ -102,16 +151,10 @@ id::LeastSquares PaperFit::problem(const std::vector<bool>& used) const {
   // the columns of the Jacobian share what their unknown does not change, and begin with the last point tried
   p.evaluate = [this, used, runs = std::make_shared<PaperRuns>()](const Eigen::VectorXd& x, Eigen::VectorXd& r,
                                                                   Eigen::MatrixXd* jacobian) {
-    r = weighted(simulate(x, *runs), used);
+    const auto residuals = [&](const std::vector<Figure>& simulated) { return weighted(simulated, used); };
+    r = residuals(simulate(x, *runs));
     if (jacobian == nullptr) return r.allFinite();
-    jacobian->resize(r.size(), x.size());
-    for (Eigen::Index k = 0; k < x.size(); ++k) {
-      const double top = std::log(unknowns_[static_cast<std::size_t>(k)].high);
-      const double step = x[k] + difference_step > top ? -difference_step : difference_step;
-      Eigen::VectorXd moved = x;
-      moved[k] += step;
-      jacobian->col(k) = (weighted(simulate(moved, *runs), used) - r) / step;
-    }
+    *jacobian = derivatives(x, *runs, residuals);
     *runs = {};
     return r.allFinite() && jacobian->allFinite();
   };
@@ -153,31 +196,35 @@ Eigen::VectorXd PaperFit::searched(const std::vector<bool>& used, int points, in
   return squares(other) < squares(one) ? other : one;
 }
 
-Eigen::VectorXd PaperFit::deviation(const Eigen::VectorXd& x) const {
-  const std::vector<bool> all(published_.size(), true);
-  Eigen::VectorXd r;
-  Eigen::MatrixXd jacobian;
-  problem(all).evaluate(x, r, &jacobian);
-  double figures = 0;
-  for (const double n : independent_figures) figures += n;
-  const double variance = r.squaredNorm() / std::max(1.0, figures - static_cast<double>(x.size()));
-  const Eigen::MatrixXd information = jacobian.transpose() * jacobian;
-  const Eigen::MatrixXd covariance = variance * information.completeOrthogonalDecomposition().pseudoInverse();
-  return covariance.diagonal().cwiseMax(0).cwiseSqrt();
+Eigen::VectorXd PaperFit::deviation(const Eigen::VectorXd& x, const std::vector<bool>& used) const {
+  PaperRuns runs;
+  const UsedTables tables = used_tables(differences(simulate(x, runs), published_), published_, used);
+  const Eigen::MatrixXd in_sigmas = derivatives(x, runs, [&](const std::vector<Figure>& simulated) {
+    const std::vector<double> d = differences(simulated, published_);
+    Eigen::VectorXd r = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(d.size()));
+    for (std::size_t k = 0; k < d.size(); ++k) {
+      if (used[k]) r[static_cast<Eigen::Index>(k)] = tables[group_of(published_[k])].per_sigma() * d[k];
+    }
+    return r;
+  });
+  // what the figures do not determine has the range of the search
+  Eigen::MatrixXd information = in_sigmas.transpose() * in_sigmas;
+  for (Eigen::Index k = 0; k < x.size(); ++k) {
+    const PaperUnknown& u = unknowns_[static_cast<std::size_t>(k)];
+    information(k, k) += 12 / std::pow(std::log(u.high / u.low), 2);
+  }
+  return information.inverse().diagonal().cwiseSqrt();
 }
 
 double PaperFit::score(const std::vector<Figure>& simulated) const {
-  const std::array<double, 5> n = counts(published_);
-  const std::vector<double> d = differences(simulated, published_);
-  std::array<double, 5> squares{};
-  for (std::size_t k = 0; k < d.size(); ++k) squares[static_cast<std::size_t>(published_[k].group)] += d[k] * d[k];
-  double score = 0, figures = 0;
-  for (std::size_t g = 0; g < n.size(); ++g) {
-    constexpr double least = 0.02;  // figures are printed with two to four digits
-    score += independent_figures[g] * std::log(std::max(least, std::sqrt(squares[g] / n[g])));
-    figures += independent_figures[g];
+  const std::vector<bool> all(published_.size(), true);
+  const UsedTables tables = used_tables(differences(simulated, published_), published_, all);
+  double cost = 0, figures = 0;
+  for (const UsedTable& table : tables) {
+    cost += table.cost();
+    figures += table.independent;
   }
-  return score + 0.5 * static_cast<double>(unknowns_.size() + (effects_.other_ocv ? 1U : 0U)) * std::log(figures);
+  return cost + 0.5 * static_cast<double>(unknowns_.size() + (effects_.other_ocv ? 1U : 0U)) * std::log(figures);
 }
 
 }  // namespace bms::study

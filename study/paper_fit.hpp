@@ -1,6 +1,16 @@
 // One candidate of the diagnosis of the paper, fitted to some of the published figures.
+//
+// A fit weights each table by the difference of two such experiments that is expected. For the comparison of candidates
+// the differences of a table have one unknown variance. Its prior is a scaled inverse chi-squared distribution around
+// the expected difference, with the information of one figure. Integrated over, a table of n independent figures with a
+// mean square difference m costs
+//
+//   (nu + n) / 2 ln(1 + n m / (nu s^2))        nu = 1, s: the expected difference
+//
+// so that a table that no candidate explains decides less, and a candidate gains little where all of them fit well.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -35,10 +45,10 @@ class PaperFit {
   /// used: by figure, whether it counts.
   Eigen::VectorXd fit(const Eigen::VectorXd& from, const std::vector<bool>& used, int iterations) const;
 
-  /// Standard deviations of the logarithms at x, from the derivatives and the weighted residuals of all figures.
-  Eigen::VectorXd deviation(const Eigen::VectorXd& x) const;
+  /// Standard deviations of the logarithms at x, from the figures used.
+  Eigen::VectorXd deviation(const Eigen::VectorXd& x, const std::vector<bool>& used) const;
 
-  /// Sum over the groups of independent figures times the logarithm of their RMS difference, and the penalty.
+  /// The cost of all figures, and the penalty of Schwarz for the unknowns.
   double score(const std::vector<Figure>& simulated) const;
 
   const std::vector<Figure>& published() const { return published_; }
@@ -46,6 +56,8 @@ class PaperFit {
  private:
   id::LeastSquares problem(const std::vector<bool>& used) const;
   Eigen::VectorXd weighted(const std::vector<Figure>& simulated, const std::vector<bool>& used) const;
+  Eigen::MatrixXd derivatives(const Eigen::VectorXd& x, PaperRuns& runs,
+                              const std::function<Eigen::VectorXd(const std::vector<Figure>&)>& of) const;
 
   model::CellParameters<> cell_;
   Effects effects_;
