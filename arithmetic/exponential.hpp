@@ -24,6 +24,12 @@ namespace exponential_detail {
 template <class S>
 inline constexpr bool short_mantissa = std::same_as<S, float> || std::same_as<S, FixedPoint>;
 
+/// Type of a constant that is added to F or multiplies it.
+template <class F>
+struct ConstantOf {
+  using type = F;
+};
+
 /// (1 - exp(-x)) / x on [0, 1/4], degree 3: interpolation in the Chebyshev nodes, error below 2.4e-7.
 inline constexpr std::array<double, 4> chebyshev = {0.9999997659, -0.4999699927, 0.1660622501, -0.03772897426};
 
@@ -48,6 +54,12 @@ concept Dual = requires(S s) {
   s.v;
 };
 
+/// A number for each of several cells. Its overloads are in arithmetic/lanes.hpp.
+template <class S>
+concept ManyNumbers = requires {
+  typename S::Mask;
+};
+
 namespace exponential_detail {
 
 /// p = settled(x), with its derivative exp(-x).
@@ -62,9 +74,7 @@ constexpr S with_derivative(S x, const decltype(S::a)& p) {
 
 /// Returns true if x is beyond the range of the polynomial.
 template <class S>
-constexpr bool long_step(const Fraction<S>& x) {
-  return x > Fraction<S>(0.25);
-}
+requires(!ManyNumbers<S>) constexpr bool long_step(const Fraction<S>& x) { return x > Fraction<S>(0.25); }
 
 /// 1 - exp(-x) for x <= 1/4.
 template <class S>
@@ -74,7 +84,7 @@ constexpr Fraction<S> step_response_short(Fraction<S> x) {
   if constexpr (Dual<S>) return exponential_detail::with_derivative(x, step_response_short<decltype(x.a)>(x.a));
   F q;
   if constexpr (d::short_mantissa<S>) {
-    constexpr auto c = d::converted<F>(d::chebyshev);
+    constexpr auto c = d::converted<typename d::ConstantOf<F>::type>(d::chebyshev);
     const F x2(x * x);  // in pairs (Estrin): half as long a chain of dependent operations as Horner's
     q = F((c[0] + F(x * c[1])) + F(x2 * F(c[2] + F(x * c[3]))));
   } else {
@@ -86,7 +96,7 @@ constexpr Fraction<S> step_response_short(Fraction<S> x) {
 
 /// 1 - exp(-x).
 template <class S>
-constexpr Fraction<S> step_response(const Exponent<S>& x) {
+requires(!ManyNumbers<S>) constexpr Fraction<S> step_response(const Exponent<S>& x) {
   using F = Fraction<S>;
   if constexpr (Dual<S>) return exponential_detail::with_derivative(x, step_response<decltype(x.a)>(x.a));
   if (x > Exponent<S>(0.25)) [[unlikely]] {

@@ -65,6 +65,8 @@ class Charge {
   }
 
  private:
+  friend struct LaneAccess;
+
   static constexpr std::int32_t to_counts(const Soc& delta, const Scale& scale) {
     const Soc most(model::max_soc);
     const Soc clamped = limited(delta, most);

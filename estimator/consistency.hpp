@@ -86,6 +86,8 @@ class Consistency {
   }
 
  private:
+  friend struct LaneAccess;
+
   Voltage unchecked_below_v_{-1};
   std::uint64_t last_us_ = 0;  ///< time of the last check that was asked for
   Voltage mean_v_{}, overpotential_v_{};

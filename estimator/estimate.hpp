@@ -50,12 +50,12 @@ struct ExtendedEstimate : Estimate<S> {
 /// Whether every number of an estimate in floating point is finite, and sigma above 0. Not-a-number and infinity times
 /// 0 are not-a-number, so one comparison decides.
 template <class S>
-constexpr bool is_finite(const Estimate<S>& e, const S& more = S(0)) {
+constexpr auto is_finite(const Estimate<S>& e, const S& more = S(0)) {
   const S sum = e.voltage_predicted_v + e.v_rc_v + more;
   return e.soc_sigma > (sum + e.soc_sigma) * S(0);
 }
 template <class S, std::size_t N>
-constexpr bool is_finite(const ExtendedEstimate<S, N>& e) {
+constexpr auto is_finite(const ExtendedEstimate<S, N>& e) {
   S sum(0);
   for (const S& value : e.extra) sum += value;
   return is_finite<S>(static_cast<const Estimate<S>&>(e), sum);

@@ -110,6 +110,8 @@ class InputCheck {
   }
 
  private:
+  friend struct LaneAccess;
+
   /// Counts readings beyond the plausible range: up for a charge, down for a discharge.
   [[gnu::noinline]] constexpr bool lasts_beyond_limits(std::int32_t current_ua, std::int32_t possible_ua) {
     if (!within(current_ua, -possible_ua, possible_ua)) {  // so is a missing one

@@ -113,6 +113,8 @@ class SocEstimator {
   constexpr std::uint64_t time_us() const { return time_us_; }
 
  private:
+  friend struct LaneAccess;  ///< steps many estimators at once (host_sim/lane_access.hpp)
+
   using StepInput = model::StepInput<S>;
   using At = model::TablePoint<S>;
   using Soc = arithmetic::Soc<S>;
@@ -225,12 +227,7 @@ class SocEstimator {
   template <class Cell>
   [[gnu::always_inline]] constexpr void observe(const Cell& cell, const At& at, const StepInput& input,
                                                 const Voltage& innovation_v) {
-    const Voltage drop_v = steady_state_drop_v<S>(at, input.current_a);
-    const Variance error_v2 =
-        Errors::error_in_noise(cell.noise, at.error_v2, [&] { return soc_axis_variance<S>(cell.noise, at); });
-    const Variance model_v2 =
-        Variance(arithmetic::product<Variance>(error_v2, constants_.correlated_samples()) +
-                 arithmetic::product<Variance>(Variance(drop_v * drop_v), constants_.resistance_noise()));
+    const Variance model_v2 = model_noise_v2<S, Errors>(cell.noise, at, input.current_a, constants_);
     const Variance noise_v2 = Variance(monitor_.reading_noise_v2() + model_v2);
     state_.apply(
         state_.covariance.observe(Model::measurement_jacobian(laws_of(cell), at, input), noise_v2, innovation_v),

@@ -95,6 +95,8 @@ class SocMonitor {
   constexpr void follow(const Soc& by) { bank_.follow(by); }
 
  private:
+  friend struct LaneAccess;
+
   /// By how much a SOC is outside of what a cell can have; else <= 0.
   static constexpr Soc beyond_range(const Soc& soc) {
     return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + capacity_may_be_off));

@@ -170,6 +170,8 @@ class UdCovariance {
   }
 
  private:
+  friend struct LaneAccess;
+
   static constexpr std::size_t place(std::size_t i, std::size_t j) { return j * (j - 1) / 2 + i; }
   constexpr Coupling& u(std::size_t i, std::size_t j) { return u_[place(i, j)]; }
   constexpr const Coupling& u(std::size_t i, std::size_t j) const { return u_[place(i, j)]; }

@@ -73,4 +73,16 @@ constexpr arithmetic::Variance<S> soc_axis_variance(const Tables& tables, const 
   return sigma_v * sigma_v;
 }
 
+/// Variance of the model's error as noise of one voltage reading. Errors: persistent_errors.hpp; Constants: those of
+/// the step (step_constants.hpp).
+template <class S, class Errors, class Constants>
+constexpr arithmetic::Variance<S> model_noise_v2(const model::FilterNoise<S>& noise, const model::TablePoint<S>& at,
+                                                 const arithmetic::Current<S>& current_a, const Constants& constants) {
+  using Variance = arithmetic::Variance<S>;
+  const arithmetic::Voltage<S> drop_v = steady_state_drop_v<S>(at, current_a);
+  const Variance error_v2 = Errors::error_in_noise(noise, at.error_v2, [&] { return soc_axis_variance<S>(noise, at); });
+  return Variance(arithmetic::product<Variance>(error_v2, constants.correlated_samples()) +
+                  arithmetic::product<Variance>(Variance(drop_v * drop_v), constants.resistance_noise()));
+}
+
 }  // namespace bms::estimator

@@ -312,12 +312,9 @@ constexpr std::size_t interval_of(const Cell<S, Max>& cell, const Soc<S>& soc, s
   return k;
 }
 
-/// interval: result of the last look-up, 0 at first; updated.
-template <class S, std::size_t Max>
-constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std::uint8_t& interval) {
-  const std::size_t k = interval_of(cell, soc, interval);
-  interval = static_cast<std::uint8_t>(k);
-  const Interval<S>& i = cell.interval[k];
+/// The tables at soc, which is in interval i.
+template <class S>
+constexpr TablePoint<S> point_in(const Interval<S>& i, const Soc<S>& soc) {
   const Soc<S> t = (soc - i.start) * i.per_width;
   return {.per_width = i.per_width,
           .ocv_v = i.ocv_v + Voltage<S>(t * i.ocv_delta_v),
@@ -331,6 +328,14 @@ constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std
           .error_v2 = i.error_v2,
           .gap = i.gap + Factor<S>(t * i.gap_delta),
           .gap_delta = i.gap_delta};
+}
+
+/// interval: result of the last look-up, 0 at first; updated.
+template <class S, std::size_t Max>
+constexpr TablePoint<S> look_up(const Cell<S, Max>& cell, const Soc<S>& soc, std::uint8_t& interval) {
+  const std::size_t k = interval_of(cell, soc, interval);
+  interval = static_cast<std::uint8_t>(k);
+  return point_in(cell.interval[k], soc);
 }
 
 template <class S, std::size_t Max>

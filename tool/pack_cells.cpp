@@ -2,27 +2,53 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "host_sim/lanes.hpp"
 #include "host_sim/simulation.hpp"
 
 namespace bms::tool {
 
+namespace {
+
+/// Estimates of one cell after the other.
+std::vector<host_sim::Track> tracks_of(const std::vector<measurement::Recording>& cells,
+                                       const host_sim::ReplayResult& mean,
+                                       const std::optional<measurement::StartingPoint>& start) {
+  std::vector<host_sim::LaneInput> inputs;
+  for (const measurement::Recording& one : cells) inputs.push_back({mean.cell, measurement::SampleList(one), start});
+  if (mean.scalar == host_sim::ScalarKind::float32) return host_sim::run_in_lanes(inputs).tracks;
+  std::vector<host_sim::Track> tracks;
+  for (const host_sim::LaneInput& in : inputs)
+    tracks.push_back(host_sim::run_on_host(in.cell, in.samples, start, mean.scalar, host_sim::Timing::none));
+  return tracks;
+}
+
+}  // namespace
+
 std::vector<PackCell> replay_cells(const host_sim::ReplayResult& mean,
                                    const std::optional<measurement::StartingPoint>& start) {
   std::vector<PackCell> cells;
-  for (std::size_t k = 0; k < mean.recording.cell_voltage_v.size(); ++k) {
-    host_sim::ReplayResult one;
-    one.recording = measurement::cell(mean.recording, k);
-    one.cell = mean.cell;
-    one.scalar = mean.scalar;
-    one.prior = mean.prior;
-    one.initial_soc = mean.initial_soc;
-    one.track = host_sim::run_on_host(one.cell, measurement::SampleList(one.recording), start, one.scalar);
-    host_sim::evaluate(one);
-    cells.push_back({k + 1, one.soc.final, one.soc.final_sigma, one.voltage.prediction_rmse_v});
+  const std::size_t count = mean.recording.cell_voltage_v.size();
+  while (cells.size() < count) {  // a group at a time: the estimates of all cells may be larger than the memory
+    std::vector<measurement::Recording> group;
+    for (std::size_t k = cells.size(); k < count && group.size() < host_sim::lane_count(); ++k)
+      group.push_back(measurement::cell(mean.recording, k));
+    std::vector<host_sim::Track> tracks = tracks_of(group, mean, start);
+    for (std::size_t k = 0; k < group.size(); ++k) {
+      host_sim::ReplayResult one;
+      one.recording = std::move(group[k]);
+      one.cell = mean.cell;
+      one.scalar = mean.scalar;
+      one.prior = mean.prior;
+      one.initial_soc = mean.initial_soc;
+      one.track = std::move(tracks[k]);
+      host_sim::evaluate(one);
+      cells.push_back({cells.size() + 1, one.soc.final, one.soc.final_sigma, one.voltage.prediction_rmse_v});
+    }
   }
   return cells;
 }

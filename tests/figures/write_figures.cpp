@@ -26,6 +26,7 @@
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
+#include "host_sim/lanes.hpp"
 #include "host_sim/replay.hpp"
 #include "host_sim/simulation.hpp"
 #include "identification/identify.hpp"
@@ -232,6 +233,22 @@ std::string mechanism_tables() {
   return table;
 }
 
+/// The best of several runs, as run_on_host() measures one cell. The cells of a pack differ by 0.2 mV.
+double steps_per_second_in_lanes(const files::CellFile& cell, const measurement::Recording& recording) {
+  constexpr int runs = 10;
+  std::vector<measurement::Recording> cells(2 * host_sim::lane_count(), recording);
+  std::vector<host_sim::LaneInput> inputs;
+  for (std::size_t k = 0; k < cells.size(); ++k) {
+    std::vector<double> voltage_v = recording.voltage_v.copy();
+    for (double& v : voltage_v) v += 2e-4 * static_cast<double>(k);
+    cells[k].voltage_v = measurement::Column(std::move(voltage_v));
+    inputs.push_back({cell, measurement::SampleList(cells[k])});
+  }
+  double best = 0;
+  for (int k = 0; k < runs; ++k) best = std::max(best, host_sim::run_in_lanes(inputs).steps_per_second);
+  return best;
+}
+
 std::string speed() {
   std::string table = "| what | figure |\n|---|---|\n";
   const files::CellFile cell = files::read_cell("table9");
@@ -242,6 +259,8 @@ std::string speed() {
     table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", host_sim::name_of(scalar),
                          host_sim::run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
   }
+  table += fmt::format("| replay on the host, float, {} cells in lanes | {:.1f} million steps/s |\n",
+                       2 * host_sim::lane_count(), steps_per_second_in_lanes(cell, recording) / 1e6);
   const images::EmulatedBoard& board = images::emulated_boards().front();
   const auto image = images::firmware_image(board.name, cell, images::Image::replay);
   double fastest = 0;
