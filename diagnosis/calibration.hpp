@@ -118,10 +118,10 @@ class Calibration {
   void adjust(model::TablePoint<S>& at, const S& soc, const std::vector<U>& u, const Pulled& pulled = {}) const {
     at.ocv_v += pulled(Lever::ocv, ocv_.at(soc, u));
     for (const Corner& c : corners_) {
-      const double apart = (number(soc) - c.soc) / c.width;
-      if (apart <= -1 || apart >= 1) continue;
+      const double apart_soc = number(soc) - c.soc;
+      if (apart_soc <= -c.width || apart_soc >= c.width) continue;
       const S t = (soc - S(c.soc)) * (1 / c.width);
-      at.ocv_v += u[c.unknown] * (c.sigma_v * (apart < 0 ? S(1) + t : S(1) - t));
+      at.ocv_v += u[c.unknown] * (c.sigma_v * (apart_soc < 0 ? S(1) + t : S(1) - t));
     }
     at.r0_ohm *= factor(pulled(Lever::r0, r0_.at(soc, u)));
     at.r1_ohm *= factor(pulled(Lever::r1, r1_.at(soc, u)));
@@ -141,8 +141,8 @@ class Calibration {
     };
     ocv_.each(soc, through(Lever::ocv));
     for (const Corner& c : corners_) {
-      const double apart = std::abs(soc - c.soc) / c.width;
-      if (apart < 1) f(Lever::ocv, c.unknown, c.sigma_v * (1 - apart));
+      const double apart_soc = std::abs(soc - c.soc);
+      if (apart_soc < c.width) f(Lever::ocv, c.unknown, c.sigma_v * (1 - apart_soc / c.width));
     }
     r0_.each(soc, through(Lever::r0));
     r1_.each(soc, through(Lever::r1));

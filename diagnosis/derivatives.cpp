@@ -15,7 +15,9 @@ namespace bms::diagnosis {
 namespace {
 
 /// Derivatives that go through the simulation at once.
-enum : std::size_t { few_lanes = 4, many_lanes = 8 };
+enum : std::size_t { least_lanes = 2, few_lanes = 4, many_lanes = 8, most_lanes = 12 };
+/// An even number: two doubles fit one register.
+constexpr std::size_t even(std::size_t lanes) { return lanes + lanes % 2; }
 
 /// The base parameters for derivatives along one row: a lane per lever, then one per state as it was before the row.
 template <class S>
@@ -145,12 +147,15 @@ Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd&
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(by.size()));
   if (by.empty()) return columns;
   for (std::size_t first = 0; first < by.size();) {
-    const bool few = by.size() - first <= few_lanes;
-    const std::size_t here = std::min<std::size_t>(few ? few_lanes : many_lanes, by.size() - first);
-    if (few)
+    const std::size_t left = by.size() - first, here = left <= most_lanes ? left : many_lanes;
+    if (here <= least_lanes)
+      derive<least_lanes>(h, u, by, first, here, columns);
+    else if (here <= few_lanes)
       derive<few_lanes>(h, u, by, first, here, columns);
-    else
+    else if (here <= many_lanes)
       derive<many_lanes>(h, u, by, first, here, columns);
+    else
+      derive<most_lanes>(h, u, by, first, here, columns);
     first += here;
   }
   whiten(columns);
@@ -201,16 +206,21 @@ void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Colum
 }
 
 Columns LikelihoodModel::calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  Columns columns = raw_calibration_derivatives(h, u);
+  whiten(columns);
+  return columns;
+}
+
+Columns LikelihoodModel::raw_calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const {
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
   std::size_t states = 0;
   for (const MechanismSetting& s : h.settings) states += model::catalogue[s.index].states;
-  constexpr std::size_t one_law = Lever::count + model::OneRc<double>::states + 1,
-                        all_laws = Lever::count + model::OpenLoopSimulation<double>::most_states;
-  if (states <= 1)
-    carry<one_law>(h, u, columns);
+  constexpr std::size_t two_states = even(Lever::count + model::OneRc<double>::states + 2),
+                        all_laws = even(Lever::count + model::OpenLoopSimulation<double>::most_states);
+  if (states <= two_states - Lever::count - model::OneRc<double>::states)
+    carry<two_states>(h, u, columns);
   else
     carry<all_laws>(h, u, columns);
-  whiten(columns);
   return columns;
 }
 

@@ -2,6 +2,7 @@
 // u eliminated at every step (variable projection), bounds kept by an active set. Equations: docs/diagnosis_method.md.
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -11,12 +12,6 @@
 #include "diagnosis/likelihood_model.hpp"
 
 namespace bms::diagnosis {
-
-/// J_u and the factors of J_u' J_u + I.
-struct LikelihoodModel::Linearisation {
-  Columns columns;  ///< J_u, white
-  Eigen::LLT<Eigen::MatrixXd> normal;
-};
 
 namespace {
 
@@ -96,6 +91,8 @@ class GaussNewton {
   double cost_of(Hypothesis& h, const Eigen::VectorXd& u, const Eigen::VectorXd& residual) const {
     return residual.squaredNorm() + u.squaredNorm() + parameters_.prior(h);
   }
+  LikelihoodModel::Point here() const { return {fit_.hypothesis, fit_.calibration}; }
+  void derive();
   NormalEquations normal_equations();
   Attempt attempt_step(const NormalEquations& equations);
   bool linearise_again(const Attempt& attempt, int iteration, int& iterations);
@@ -107,6 +104,8 @@ class GaussNewton {
   HypothesisFit fit_;
   double cost_at_start_ = 0;
   std::shared_ptr<const Linearisation> around_;
+  std::optional<LikelihoodModel::Point> derived_at_;
+  Columns by_theta_;         ///< there, per unit step
   Eigen::MatrixXd schur_;    ///< of theta, u eliminated
   Eigen::VectorXd natural_;  ///< d parameter / d step
   double damping_ = fit_numerics.damping;
@@ -117,7 +116,8 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
     : likelihood_(likelihood),
       parameters_(likelihood.cell_, start),
       m_(parameters_.size()),
-      fit_{start, calibration, {}, 0, likelihood.noise_, {}, std::vector<char>(static_cast<std::size_t>(m_), 0), false},
+      fit_{start, calibration, {}, 0, likelihood.noise_, {}, {}, std::vector<char>(static_cast<std::size_t>(m_), 0),
+           false},
       natural_(Eigen::VectorXd::Ones(m_)) {
   for (Eigen::Index j = 0; j < m_; ++j) {
     double& value = parameters_.of(fit_.hypothesis, j);
@@ -130,12 +130,20 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
   around_ = likelihood.nearby_;
 }
 
-GaussNewton::NormalEquations GaussNewton::normal_equations() {
-  Columns j_theta = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
+/// Derivatives by theta, as long as the fit stands where they were taken.
+void GaussNewton::derive() {
+  if (derived_at_ == here()) return;
+  derived_at_ = here();
+  by_theta_ = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
   for (Eigen::Index j = 0; j < m_; ++j) {
     natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
-    j_theta.col(j) *= natural_[j];
+    by_theta_.col(j) *= natural_[j];
   }
+}
+
+GaussNewton::NormalEquations GaussNewton::normal_equations() {
+  derive();
+  const Columns& j_theta = by_theta_;
   const Columns& j_u = around_->columns;
   NormalEquations e;
   e.u_gradient = j_u.transpose() * fit_.residual - fit_.calibration;
@@ -209,7 +217,7 @@ bool GaussNewton::linearise_again(const Attempt& attempt, int iteration, int& it
   quiet_ = 0;
   damping_ =
       attempt.astray ? std::max(fit_numerics.damping, damping_ / fit_numerics.damping_restart) : fit_numerics.damping;
-  around_ = likelihood_.linearised(fit_.hypothesis, fit_.calibration);
+  if (!(around_->at == here())) around_ = likelihood_.linearised(fit_.hypothesis, fit_.calibration);
   iterations = std::max(iterations, iteration + fit_numerics.iterations_after_renewal);
   return true;
 }
@@ -254,15 +262,36 @@ void GaussNewton::finish() {
 
 std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::linearised(const Hypothesis& h,
                                                                                   const Eigen::VectorXd& u) const {
+  Columns columns = raw_calibration_derivatives(h, u);
+  whiten(columns);
+  return factorised({h, u}, std::move(columns));
+}
+
+std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::factorised(Point at, Columns columns) const {
   auto made = std::make_shared<Linearisation>();
-  made->columns = calibration_derivatives(h, u);
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Identity(made->columns.cols(), made->columns.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(made->columns.transpose());
-  made->normal.compute(normal);
+  made->at = std::move(at);
+  made->columns = std::move(columns);
+  made->gram = squared(made->columns);
+  made->gram.diagonal().array() += 1;
+  made->normal.compute(made->gram);
   return made;
 }
 
-void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linearised(h, u); }
+std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::linearised_at(const Hypothesis& h,
+                                                                                     const Eigen::VectorXd& u) const {
+  const Point at{h, u};
+  for (const auto& known : {nearby_, latest_}) {
+    if (known && known->at == at) return known;
+  }
+  if (!(at == Point{base(), unchanged()})) return latest_ = linearised(h, u);
+  // the noise changes often, this point never
+  if (!at_base_) at_base_ = std::make_shared<const Columns>(raw_calibration_derivatives(h, u));
+  Columns columns = *at_base_;
+  whiten(columns);
+  return latest_ = factorised(at, std::move(columns));
+}
+
+void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linearised_at(h, u); }
 
 HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) const {
   return fit(start, unchanged(), iterations);

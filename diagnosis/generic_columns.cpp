@@ -116,14 +116,47 @@ std::vector<ColumnFamily> families_of(std::size_t records) {
   return families;
 }
 
+/// Cosine and sine of a frequency at ascending times. While the steps are equal each is turned from the last one.
+class Wave {
+ public:
+  explicit Wave(double frequency_hz) : turn_per_s_(2 * std::numbers::pi * frequency_hz) {}
+
+  void at(double time_s) {
+    const double step_s = time_s - last_s_;
+    last_s_ = time_s;
+    if (step_s != step_s_ || turned_ == numerics.grid.most_turns) {
+      cosine_ = std::cos(turn_per_s_ * time_s);
+      sine_ = std::sin(turn_per_s_ * time_s);
+      turned_ = 0;
+      if (step_s == step_s_) return;
+      step_s_ = step_s;
+      step_cosine_ = std::cos(turn_per_s_ * step_s);
+      step_sine_ = std::sin(turn_per_s_ * step_s);
+      return;
+    }
+    const double before = cosine_;
+    cosine_ = before * step_cosine_ - sine_ * step_sine_;
+    sine_ = sine_ * step_cosine_ + before * step_sine_;
+    ++turned_;
+  }
+  double cosine() const { return cosine_; }
+  double sine() const { return sine_; }
+
+ private:
+  double turn_per_s_, last_s_ = std::nan(""), step_s_ = std::nan("");
+  double cosine_ = 1, sine_ = 0, step_cosine_ = 1, step_sine_ = 0;
+  std::size_t turned_ = 0;
+};
+
 /// Power of a channel at a frequency.
 double power_at(std::span<const double> time_s, const std::vector<double>& value, double frequency_hz) {
+  Wave wave(frequency_hz);
   double re = 0, im = 0;
   for (std::size_t k = 0; k < value.size(); ++k) {
+    wave.at(time_s[k]);
     if (!std::isfinite(value[k])) continue;
-    const double turn = 2 * std::numbers::pi * frequency_hz * time_s[k];
-    re += value[k] * std::cos(turn);
-    im += value[k] * std::sin(turn);
+    re += value[k] * wave.cosine();
+    im += value[k] * wave.sine();
   }
   return re * re + im * im;
 }
@@ -194,15 +227,21 @@ std::vector<double> strange_frequencies(const PreparedRecording& r) {
   return strange;
 }
 
-Columns sine_columns(const LikelihoodModel& likelihood, double frequency_hz) {
+Columns sine_columns(const LikelihoodModel& likelihood, std::span<const double> frequencies_hz) {
   const measurement::Column& time_s = likelihood.records().front().time_s;
-  Columns wave = Columns::Zero(static_cast<Eigen::Index>(likelihood.samples()), 2);
-  for (std::size_t k = 0; k < time_s.size(); ++k) {
-    const double turn = 2 * std::numbers::pi * frequency_hz * time_s[k];
-    wave(static_cast<Eigen::Index>(k), 0) = std::cos(turn);
-    wave(static_cast<Eigen::Index>(k), 1) = std::sin(turn);
+  Columns waves = Columns::Zero(static_cast<Eigen::Index>(likelihood.samples()),
+                                2 * static_cast<Eigen::Index>(frequencies_hz.size()));
+  Eigen::Index at = 0;
+  for (const double frequency_hz : frequencies_hz) {
+    Wave wave(frequency_hz);
+    for (std::size_t k = 0; k < time_s.size(); ++k) {
+      wave.at(time_s[k]);
+      waves(static_cast<Eigen::Index>(k), at) = wave.cosine();
+      waves(static_cast<Eigen::Index>(k), at + 1) = wave.sine();
+    }
+    at += 2;
   }
-  return wave;
+  return waves;
 }
 
 }  // namespace bms::diagnosis

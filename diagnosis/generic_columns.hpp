@@ -1,6 +1,7 @@
 // Columns without physics over all recordings, in families that are tested one by one.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include <Eigen/Core>
@@ -27,7 +28,8 @@ GenericColumns generic_columns(const LikelihoodModel& likelihood, const Hypothes
 /// small error of the model repeats as well.
 std::vector<double> strange_frequencies(const PreparedRecording& record);
 
-/// Cosine and sine over the first record, 0 in the others: two columns, LikelihoodModel::samples() rows, not white.
-Columns sine_columns(const LikelihoodModel& likelihood, double frequency_hz);
+/// Cosine and sine over the first record, 0 in the others: two columns per frequency, LikelihoodModel::samples() rows,
+/// not white.
+Columns sine_columns(const LikelihoodModel& likelihood, std::span<const double> frequencies_hz);
 
 }  // namespace bms::diagnosis

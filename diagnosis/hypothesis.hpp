@@ -28,7 +28,8 @@ struct Hypothesis {
   /// The setting of the first mechanism with this kind of signature, nullptr if it is missing.
   const MechanismSetting* find(Signature signature) const;
   std::vector<ParameterRef> sought() const;  ///< estimated parameters
-  std::string name() const;                  ///< ids joined by '+', "calibration" if it adds none
+  bool operator==(const Hypothesis&) const = default;
+  std::string name() const;  ///< ids joined by '+', "calibration" if it adds none
 };
 
 /// With this mechanism added, its strengths at their neutral values.

@@ -23,6 +23,13 @@ bool has_own_branch(const std::vector<MechanismSetting>& own, const std::vector<
          std::any_of(own.begin(), own.end(), [](const MechanismSetting& s) { return s.index == hysteresis; });
 }
 
+/// Returns true if two noise models differ by no more than what rounding leaves of a step there and back.
+bool is_same(const NoiseModel& a, const NoiseModel& b) {
+  return std::all_of(amplitudes.begin(), amplitudes.end(), [&](const auto amplitude) {
+    return std::abs(a.*amplitude - b.*amplitude) <= numerics.noise.same_amplitude * a.*amplitude;
+  });
+}
+
 }  // namespace
 
 LikelihoodModel::LikelihoodModel(const model::CellParameters<>& cell, std::vector<MechanismSetting> own,
@@ -80,19 +87,27 @@ void LikelihoodModel::set_noise(const NoiseModel& noise) {
   noise_ = noise;
   whiteners_ = whiteners_for(noise);
   nearby_.reset();
+  latest_.reset();
+}
+
+double LikelihoodModel::cost_of_noise(const Columns& raw, const NoiseModel& noise, const NoiseModel& nominal) const {
+  double sum = price_of_noise(noise, nominal);
+  std::size_t row = 0;
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    sum += minus_two_log_likelihood(noise, records_[r].time_s, row_noise_[r], usable_[r],
+                                    {raw.data() + row, records_[r].size()});
+    row += records_[r].size();
+  }
+  if (checks_ == 0) return sum;
+  Columns checks = raw.bottomRows(static_cast<Eigen::Index>(checks_));
+  sum += whiten_checks(checks, 0, noise);
+  return sum + checks.squaredNorm();
 }
 
 NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
-  const auto cost_of = [&](const NoiseModel& n) {
-    const std::vector<Whitener> by = whiteners_for(n);
-    Columns e = raw;
-    double sum = price_of_noise(n, nominal) + whiten(e, by, n);
-    sum += e.squaredNorm();
-    for (const Whitener& w : by) sum += w.log_determinant();
-    return sum;
-  };
   NoiseModel best = nominal;
-  cost = cost_of(best);
+  cost = cost_of_noise(raw, best, nominal);
+  std::vector<NoiseModel> tried = {best};  // the cost falls from best to best: what was tried is never better
   // coordinate search over the amplitudes, in ever smaller factors
   for (const double factor : numerics.noise.amplitude_factors) {
     for (bool moved = true; moved;) {
@@ -103,8 +118,9 @@ NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel
         for (const double by : {factor, 1 / factor}) {
           NoiseModel n = best;
           n.*member = std::max(best.*member * by, nominal.*member);
-          if (n == best) continue;
-          const double c = cost_of(n);
+          if (std::any_of(tried.begin(), tried.end(), [&](const NoiseModel& t) { return is_same(t, n); })) continue;
+          tried.push_back(n);
+          const double c = cost_of_noise(raw, n, nominal);
           if (c >= cost) continue;
           cost = c;
           best = n;

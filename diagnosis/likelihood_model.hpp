@@ -10,9 +10,11 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include "diagnosis/calibration.hpp"
@@ -33,6 +35,7 @@ struct HypothesisFit {
   Eigen::VectorXd residual;     ///< whitened, all records one after another
   double cost = 0;   ///< |residual|^2 + |calibration|^2 + priors: -2 log posterior without the part of the noise
   NoiseModel noise;  ///< with which the residual was whitened
+  std::optional<double> likeliest_cost;  ///< of the residual with the noise that it makes most probable, if known
   Eigen::MatrixXd covariance;  ///< of the estimated parameters, base parameters marginalised; in the parameters' units
   std::vector<char> at_bound;  ///< by estimated parameter
   bool converged = false;
@@ -78,6 +81,20 @@ class LikelihoodModel {
   /// Derivatives of the predicted voltage by parameters, in the parameters' units, whitened: samples() rows, a column
   /// per parameter.
   Columns derivatives(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by) const;
+  /// Base parameters' derivatives at one point.
+  struct Point {
+    Hypothesis hypothesis;
+    Eigen::VectorXd unknowns;
+    bool operator==(const Point& o) const { return hypothesis == o.hypothesis && unknowns == o.unknowns; }
+  };
+  struct Linearisation {
+    Point at;
+    Columns columns;       ///< J_u, white
+    Eigen::MatrixXd gram;  ///< J_u' J_u + I
+    Eigen::LLT<Eigen::MatrixXd> normal;
+  };
+  /// Remembers the last one: several users of the same point share it. Not for several threads at once.
+  std::shared_ptr<const Linearisation> linearised_at(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// By the base parameters' unknowns: a column each.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Measured less predicted [V], one column; 0 where there is no voltage. Checks in units of their own standard
@@ -103,7 +120,6 @@ class LikelihoodModel {
 
  private:
   friend class GaussNewton;
-  struct Linearisation;  // base parameters' derivatives and their factorised normal matrix
 
   void set_row_noise(const PreparedRecording& r);
   /// Laws, start and readings of one record. Defined in simulation_run.hpp, as are run and at_check.
@@ -124,8 +140,12 @@ class LikelihoodModel {
   /// row to row.
   template <std::size_t Lanes>
   void carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const;
+  Columns raw_calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
   std::shared_ptr<const Linearisation> linearised(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  std::shared_ptr<const Linearisation> factorised(Point at, Columns columns) const;
   std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
+  /// -2 log posterior of a noise model by a raw residual, without the constant.
+  double cost_of_noise(const Columns& raw, const NoiseModel& noise, const NoiseModel& nominal) const;
   /// Returns the logarithm of the determinant of the checks' covariance.
   double whiten(Columns& columns, const std::vector<Whitener>& by, const NoiseModel& noise) const;
   /// Checks of one voltage channel share its drift: their covariance is I + w w', undone by (I + w w')^-1/2.
@@ -144,6 +164,8 @@ class LikelihoodModel {
   std::vector<RowNoise> row_noise_;        ///< by record
   std::size_t samples_ = 0, checks_ = 0;
   mutable std::shared_ptr<const Linearisation> nearby_;  ///< where fits begin to be linear in the base parameters
+  mutable std::shared_ptr<const Linearisation> latest_;  ///< that linearised_at() has made
+  mutable std::shared_ptr<const Columns> at_base_;       ///< of the cell as its file describes it; not white
 };
 
 }  // namespace bms::diagnosis

@@ -18,39 +18,118 @@ double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
   return sum;
 }
 
+namespace {
+
+/// The Kalman filter of the fast and the slow part, as far as it does not depend on the residual: gains row by row.
+class NoiseFilter {
+ public:
+  NoiseFilter(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable)
+      : n_(n),
+        time_s_(time_s),
+        rows_(rows),
+        usable_(usable),
+        white_v2_(n.white_v * n.white_v),
+        edge2_(n.edge * n.edge) {}
+
+  struct Gain {
+    double fast, slow;              ///< Kalman gain of each state
+    double fast_decay, slow_decay;  ///< of each state until the next row
+    double slow_size;               ///< standard deviation of the slow part over that on a flat OCV
+    double variance;                ///< of the innovation; 0: row not used
+  };
+  /// Of row k; the rows must be taken in turn.
+  Gain next(std::size_t k) {
+    const double to_next_s = k + 1 < time_s_.size() ? time_s_[k + 1] - time_s_[k] : 0;
+    if (to_next_s != last_s_) {  // steps are mostly equal
+      last_s_ = to_next_s;
+      fast_decay_ = std::exp(-to_next_s / n_.fast_s);
+      slow_decay_ = std::exp(-to_next_s / n_.slow_s);
+    }
+    const double size = slow_v2_ > 0 ? std::sqrt(1 + rows_.slow_v2[k] / slow_v2_) : 1;
+    Gain g{0, 0, fast_decay_, slow_decay_, size, 0};
+    ff_ += edge2_ * rows_.edge_v2[k];
+    if (usable_[k] != 0) {
+      const double with_fast = ff_ + size * fs_, with_slow = fs_ + size * ss_;
+      g.variance = with_fast + size * with_slow + white_v2_ + edge2_ * rows_.white_v2[k];
+      const double information = 1 / g.variance;
+      g.fast = with_fast * information;
+      g.slow = with_slow * information;
+      ff_ -= g.fast * with_fast;
+      fs_ -= g.fast * with_slow;
+      ss_ -= g.slow * with_slow;
+    }
+    ff_ = fast_v2_ + fast_decay_ * fast_decay_ * (ff_ - fast_v2_);
+    ss_ = slow_v2_ + slow_decay_ * slow_decay_ * (ss_ - slow_v2_);
+    fs_ *= fast_decay_ * slow_decay_;
+    return g;
+  }
+
+ private:
+  const NoiseModel& n_;
+  std::span<const double> time_s_;
+  const RowNoise& rows_;
+  std::span<const char> usable_;
+  double white_v2_, edge2_;
+  double fast_v2_ = n_.fast_v * n_.fast_v, slow_v2_ = n_.slow_v * n_.slow_v;
+  double ff_ = fast_v2_, ss_ = slow_v2_, fs_ = 0;  ///< covariance of (fast, slow), stationary at first
+  double last_s_ = -1, fast_decay_ = 1, slow_decay_ = 1;
+};
+
+/// Sum of logarithms: of products as long as a double holds them, because a logarithm costs as much as a row.
+class SumOfLogarithms {
+ public:
+  void add(double x) {
+    product_ *= x;
+    if (++factors_ == numerics.noise.factors) flush();
+  }
+  double value() {
+    flush();
+    return sum_;
+  }
+
+ private:
+  void flush() {
+    sum_ += std::log(product_);
+    product_ = 1;
+    factors_ = 0;
+  }
+  double sum_ = 0, product_ = 1;
+  int factors_ = 0;
+};
+
+}  // namespace
+
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
                    std::span<const char> usable)
     : gains_(time_s.size()) {
-  double ff = n.fast_v * n.fast_v, ss = n.slow_v * n.slow_v, fs = 0;  // covariance of (fast, slow), stationary at first
-  const double fast_v2 = ff, slow_v2 = ss;
-  double last_s = -1, fast_decay = 1, slow_decay = 1;
+  NoiseFilter filter(n, time_s, rows, usable);
+  SumOfLogarithms log_determinant;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
-    Gain& g = gains_[k];
-    const double to_next_s = k + 1 < gains_.size() ? time_s[k + 1] - time_s[k] : 0;
-    if (to_next_s != last_s) {  // steps are mostly equal
-      last_s = to_next_s;
-      fast_decay = std::exp(-to_next_s / n.fast_s);
-      slow_decay = std::exp(-to_next_s / n.slow_s);
-    }
-    const double size = slow_v2 > 0 ? std::sqrt(1 + rows.slow_v2[k] / slow_v2) : 1;
-    g = {0, 0, fast_decay, slow_decay, size, 0};
-    ff += n.edge * n.edge * rows.edge_v2[k];
-    if (usable[k] != 0) {
-      const double with_fast = ff + size * fs, with_slow = fs + size * ss;
-      const double variance = with_fast + size * with_slow + n.white_v * n.white_v + n.edge * n.edge * rows.white_v2[k];
-      g.fast = with_fast / variance;
-      g.slow = with_slow / variance;
-      g.weight = 1 / std::sqrt(variance);
-      log_determinant_ += std::log(variance);
-      ++used_;
-      ff -= g.fast * with_fast;
-      fs -= g.fast * with_slow;
-      ss -= g.slow * with_slow;
-    }
-    ff = fast_v2 + g.fast_decay * g.fast_decay * (ff - fast_v2);
-    ss = slow_v2 + g.slow_decay * g.slow_decay * (ss - slow_v2);
-    fs *= g.fast_decay * g.slow_decay;
+    const NoiseFilter::Gain g = filter.next(k);
+    const bool used = g.variance > 0;
+    gains_[k] = {g.fast, g.slow, g.fast_decay, g.slow_decay, g.slow_size, used ? 1 / std::sqrt(g.variance) : 0};
+    if (!used) continue;
+    log_determinant.add(g.variance);
+    ++used_;
   }
+  log_determinant_ = log_determinant.value();
+}
+
+double minus_two_log_likelihood(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
+                                std::span<const char> usable, std::span<const double> residual_v) {
+  NoiseFilter filter(n, time_s, rows, usable);
+  SumOfLogarithms log_determinant;
+  double fast = 0, slow = 0, squares = 0;
+  for (std::size_t k = 0; k < time_s.size(); ++k) {
+    const NoiseFilter::Gain g = filter.next(k);
+    const double innovation = g.variance > 0 ? residual_v[k] - fast - g.slow_size * slow : 0;
+    fast = g.fast_decay * (fast + g.fast * innovation);
+    slow = g.slow_decay * (slow + g.slow * innovation);
+    if (!(g.variance > 0)) continue;
+    squares += innovation * innovation / g.variance;
+    log_determinant.add(g.variance);
+  }
+  return squares + log_determinant.value();
 }
 
 void Whitener::whiten(Eigen::Ref<Columns> columns) const {
@@ -84,6 +163,12 @@ void Whitener::whiten(std::size_t first, std::span<double> values) const {
     slow = g.slow_decay * (slow + g.slow * innovation);
     values[k] = g.weight * innovation;
   }
+}
+
+Eigen::MatrixXd squared(const Columns& columns) {
+  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
+  product.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+  return product.selfadjointView<Eigen::Lower>();
 }
 
 double quantisation_step(std::span<const double> values) {

@@ -54,6 +54,9 @@ double price_of_noise(const NoiseModel& noise, const NoiseModel& nominal);
 /// One column per signature, one row per sample.
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+/// columns' columns.
+Eigen::MatrixXd squared(const Columns& columns);
+
 /// Columns in, white columns out. Rows that are not usable give 0.
 class Whitener {
  public:
@@ -80,6 +83,11 @@ class Whitener {
   double log_determinant_ = 0;
   std::size_t used_ = 0;
 };
+
+/// -2 log likelihood of a residual by a noise model, without the constant: whitened and summed in one pass.
+/// As Whitener, for a residual of one column.
+double minus_two_log_likelihood(const NoiseModel& noise, std::span<const double> time_s, const RowNoise& rows,
+                                std::span<const char> usable, std::span<const double> residual_v);
 
 /// Standard deviation of a voltage channel's white noise [V]: from second differences where the current moves by less
 /// than quiet_a, and at least that of the quantisation. fallback_v if there are too few such rows.

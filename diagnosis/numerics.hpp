@@ -51,6 +51,8 @@ struct Numerics {
   struct Noise {
     std::array<double, 4> amplitude_factors = {2, 1.41, 1.19, 1.09};  ///< of the coordinate search, in this order
     double same_reading = 1e-9;
+    double same_amplitude = 1e-9;  ///< as a share
+    int factors = 8;  ///< of a logarithm: variances of 1e-30 to 1e30 V^2 remain within the range of a double
   };
 
   struct Search {
@@ -77,6 +79,8 @@ struct Numerics {
     double width_least = 1e-12, last_knot = 1e-9, current_least_a = 1e-9;
     double sine_ridge = 1e-6;
     std::size_t regime_bins = 40;
+    std::size_t most_turns = 256;          ///< of a wave, before rounding errors are removed
+    std::size_t frequencies_at_once = 16;  ///< whose products with the known columns are computed together
   };
 
   struct Design {

@@ -2,6 +2,8 @@
 // follow: both are projected out.
 #pragma once
 
+#include <memory>
+
 #include <Eigen/Cholesky>
 
 #include "diagnosis/likelihood_model.hpp"
@@ -14,16 +16,33 @@ class ResidualProjection {
   ResidualProjection(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
   /// To first order, strengths x of the columns lower the cost by 2 x'toward - x'gram x.
-  struct Products {
-    Eigen::MatrixXd gram;
-    Eigen::VectorXd toward;
+  class Products {
+   public:
+    Products(const ResidualProjection& by, const Columns& columns);
+
+    const Eigen::VectorXd& toward() const { return toward_; }
+    /// Of `count` neighbouring columns.
+    Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const { return gram(first, count, first, count); }
+    /// Of some columns (rows of the result) and others.
+    Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count, Eigen::Index other, Eigen::Index others) const;
+
+   private:
+    const Columns& columns_;
+    Eigen::MatrixXd cross_, solved_;  ///< known columns' products with them, and the known parameters that follow
+    Eigen::VectorXd toward_;
   };
-  /// columns: white, LikelihoodModel::samples() rows.
-  Products of(const Columns& columns) const;
+  /// columns: white, LikelihoodModel::samples() rows; they must outlive the result.
+  Products of(const Columns& columns) const { return {*this, columns}; }
 
  private:
+  const Columns& base() const { return around_->columns; }
+  /// Products of the known columns with others: by the base parameters, then by the estimated parameters.
+  template <class Matrix>
+  Eigen::MatrixXd along(const Matrix& columns) const;
+
   Eigen::VectorXd residual_;
-  Columns known_;                        ///< derivatives by the base parameters, then by the estimated parameters
+  std::shared_ptr<const LikelihoodModel::Linearisation> around_;
+  Columns own_;                          ///< derivatives by the estimated parameters
   Eigen::LDLT<Eigen::MatrixXd> normal_;  ///< known' known plus priors
   Eigen::VectorXd pulled_;               ///< step of the known parameters alone
 };

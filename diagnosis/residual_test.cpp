@@ -1,6 +1,7 @@
 #include "diagnosis/residual_test.hpp"
 
 #include <algorithm>
+#include <span>
 
 #include <Eigen/Cholesky>
 
@@ -8,6 +9,7 @@
 #include "diagnosis/locate.hpp"
 #include "diagnosis/residual_projection.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -29,32 +31,58 @@ void test_families(const LikelihoodModel& likelihood, const HypothesisFit& fit, 
   const GenericColumns generic = generic_columns(likelihood, fit);
   Columns white = generic.columns;
   likelihood.whiten(white);
-  const auto [gram, toward] = projection.of(white);
+  const ResidualProjection::Products products = projection.of(white);
   for (const ColumnFamily& f : generic.families) {
-    const Eigen::MatrixXd own_gram = gram.block(f.first, f.first, f.count, f.count);
+    const Eigen::MatrixXd own_gram = products.gram(f.first, f.count);
     Eigen::MatrixXd regular = own_gram;
     regular.diagonal().array() += 1;
     const Eigen::LDLT<Eigen::MatrixXd> solver(regular);
-    const Eigen::VectorXd x = solver.solve(toward.segment(f.first, f.count));
+    const Eigen::VectorXd toward = products.toward().segment(f.first, f.count), x = solver.solve(toward);
     // what the columns gain on noise alone: the trace of what they can follow
     const double freedom = solver.solve(own_gram).trace(),
-                 gain = toward.segment(f.first, f.count).dot(x) - residual_limits.gain_per_freedom * freedom;
+                 gain = toward.dot(x) - residual_limits.gain_per_freedom * freedom;
     if (gain <= best.gain) continue;
     best = {gain, f.depends_on, generic.columns.middleCols(f.first, f.count) * x};
   }
 }
 
-void test_frequencies(const LikelihoodModel& likelihood, const ResidualProjection& projection, Best& best) {
-  for (const double hz : strange_frequencies(likelihood.records().front())) {
-    const Columns wave = sine_columns(likelihood, hz);
-    Columns white = wave;
-    likelihood.whiten(white);
-    const auto [g, b] = projection.of(white);
+/// The frequency that gains most, and its amplitudes.
+struct BestWave {
+  double gain = 0, frequency_hz = 0;
+  Eigen::Vector2d amplitudes = Eigen::Vector2d::Zero();
+};
+
+BestWave best_of(const LikelihoodModel& likelihood, const ResidualProjection& projection,
+                 std::span<const double> frequencies_hz) {
+  Columns white = sine_columns(likelihood, frequencies_hz);
+  likelihood.whiten(white);
+  const ResidualProjection::Products products = projection.of(white);
+  BestWave best;
+  for (std::size_t k = 0; k < frequencies_hz.size(); ++k) {
+    const Eigen::Index first = 2 * static_cast<Eigen::Index>(k);
+    const Eigen::Matrix2d g = products.gram(first, 2);
+    const Eigen::Vector2d b = products.toward().segment(first, 2);
     const Eigen::Vector2d x =
         (g + numerics.grid.sine_ridge * g.diagonal().maxCoeff() * Eigen::Matrix2d::Identity()).ldlt().solve(b);
     const double gain = b.dot(x) - residual_limits.gain_of_frequencies;
-    if (gain <= best.gain) continue;
-    best = {gain, "a period of its own", wave * x};
+    if (gain > best.gain) best = {gain, frequencies_hz[k], x};
+  }
+  return best;
+}
+
+void test_frequencies(const LikelihoodModel& likelihood, const ResidualProjection& projection, Best& best) {
+  const std::vector<double> all_hz = strange_frequencies(likelihood.records().front());
+  constexpr std::size_t at_once = numerics.grid.frequencies_at_once;
+  std::vector<BestWave> waves((all_hz.size() + at_once - 1) / at_once);
+  measurement::in_parallel(waves.size(), [&](std::size_t k) {
+    const std::size_t first = k * at_once;
+    waves[k] =
+        best_of(likelihood, projection, std::span(all_hz).subspan(first, std::min(at_once, all_hz.size() - first)));
+  });
+  for (const BestWave& wave : waves) {
+    if (wave.gain <= best.gain) continue;
+    const double hz = wave.frequency_hz;
+    best = {wave.gain, "a period of its own", sine_columns(likelihood, {&hz, 1}) * wave.amplitudes};
   }
 }
 

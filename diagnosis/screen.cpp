@@ -19,33 +19,26 @@ using model::Role;
 constexpr const Thresholds::Screening& screening_limits = thresholds.screening;
 constexpr const Numerics::Signatures& signature_numerics = numerics.signatures;
 
-}  // namespace
-
-double Screen::gain_of(const Probe& probe, Eigen::VectorXd& strengths) const {
-  const auto n = static_cast<Eigen::Index>(probe.parameters.size());
-  Eigen::MatrixXd g = gram_.block(probe.first, probe.first, n, n);
-  const Eigen::VectorXd b = toward_.segment(probe.first, n);
-  for (Eigen::Index i = 0; i < n; ++i) {
-    g(i, i) *= 1 + signature_numerics.ridge_share;
-    g(i, i) += signature_numerics.ridge;
-  }
-  strengths = g.ldlt().solve(b);
-  return std::max(0.0, b.dot(strengths));
+/// Regular.
+Eigen::MatrixXd with_ridge(Eigen::MatrixXd gram) {
+  for (Eigen::Index i = 0; i < gram.rows(); ++i)
+    gram(i, i) = gram(i, i) * (1 + signature_numerics.ridge_share) + signature_numerics.ridge;
+  return gram;
 }
 
-double Screen::sigma_of(const Probe& probe) const {
-  const auto n = static_cast<Eigen::Index>(probe.parameters.size());
-  Eigen::MatrixXd g = gram_.block(probe.first, probe.first, n, n);
-  for (Eigen::Index i = 0; i < n; ++i)
-    g(i, i) = g(i, i) * (1 + signature_numerics.ridge_share) + signature_numerics.ridge;
-  return std::sqrt(std::max(g.inverse()(0, 0), 0.0));
+}  // namespace
+
+Eigen::VectorXd Screen::toward(const Probe& probe) const {
+  return products_.toward().segment(probe.first, static_cast<Eigen::Index>(probe.parameters.size()));
 }
 
 void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   const std::size_t mechanism = p.setting.index;
   const double capacity_ah = likelihood.cell().capacity_ah;
-  Eigen::VectorXd found;
-  double gain = gain_of(p, found);
+  Eigen::MatrixXd gram = products_.gram(p.first, static_cast<Eigen::Index>(p.parameters.size()));
+  const Eigen::MatrixXd regular = with_ridge(gram);
+  const Eigen::VectorXd found = regular.ldlt().solve(toward(p));  // its best strengths, to first order
+  double gain = std::max(0.0, toward(p).dot(found));
   const model::Parameter& first = model::catalogue[mechanism].parameter[p.parameters[0]];
   const bool one_sided = first.low >= 0 && first.role == Role::strength;
   if (one_sided && found[0] + p.setting.value[p.parameters[0]] < 0) gain = 0;
@@ -56,17 +49,18 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
                         [&](const Candidate& other) { return other.mechanism == mechanism; });
   if (c == candidates_.end()) {
     candidates_.push_back({mechanism, p.setting, {}, -std::numeric_limits<double>::infinity(), 0, 0, 0});
-    best_.push_back(p);
+    best_.push_back({p, gram});
     c = candidates_.end() - 1;
   }
-  const double sigma = sigma_of(p), limit = screening_limits.limit_sigma * sigma;
+  const double sigma = std::sqrt(std::max(regular.inverse()(0, 0), 0.0)),  // its places free
+      limit = screening_limits.limit_sigma * sigma;
   if (c->limit == 0 || limit < c->limit) c->limit = limit;
   if (gain <= c->gain || std::isnan(gain)) return;
   c->gain = gain;
   c->estimate = found[0] + p.setting.value[p.parameters[0]];
   c->sigma = sigma;
   c->start = knowledge_of(mechanism).start({p.setting, p.parameters, found, capacity_ah});
-  best_[static_cast<std::size_t>(c - candidates_.begin())] = p;
+  best_[static_cast<std::size_t>(c - candidates_.begin())] = {p, std::move(gram)};
 }
 
 /// Bursts have no shape that could be projected: they are searched, and their gain is that of one column.
@@ -80,13 +74,13 @@ void Screen::judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit
   if (bursts.count == 0 || bursts.resistance_ohm <= least_ohm) return;
   likelihood.whiten(bursts.column);
   const ResidualProjection::Products one = projection.of(bursts.column);
-  const double g = one.gram(0, 0), b = one.toward[0];
+  const double g = one.gram(0, 1)(0, 0), b = one.toward()[0];
   Candidate c{mechanism, {mechanism, {}, {}}, std::move(bursts.spans), 0, 0, 0, 0};
   if (g > 0 && b > 0) c.gain = b * b / g - thresholds.decision.per_burst * static_cast<double>(bursts.count);
   c.start.value[contact_resistance] = bursts.resistance_ohm;
   c.start.value[burst_share] = bursts.covered_s / std::max(likelihood.records().front().duration_s(), 1.0);
   if (c.gain <= 0) return;
-  best_.push_back({c.start, {}, 0});
+  best_.push_back({{c.start, {}, 0}, {}});
   candidates_.push_back(std::move(c));
 }
 
@@ -96,7 +90,7 @@ void Screen::sort() {
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return candidates_[a].gain > candidates_[b].gain; });
   std::vector<Candidate> candidates;
-  std::vector<Probe> best;
+  std::vector<Shape> best;
   for (const std::size_t k : order) {
     candidates.push_back(candidates_[k]);
     best.push_back(best_[k]);
@@ -105,13 +99,13 @@ void Screen::sort() {
   best_ = std::move(best);
 }
 
-Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over) {
-  const SignatureSet set = signatures(likelihood, around, over);
-  const ResidualProjection projection(likelihood, around);
-  ResidualProjection::Products products = projection.of(set.columns);
-  gram_ = std::move(products.gram);
-  toward_ = std::move(products.toward);
-  for (const Probe& p : set.probes) judge(likelihood, p);
+Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over)
+    : Screen(likelihood, around, over, ResidualProjection(likelihood, around)) {}
+
+Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over,
+               const ResidualProjection& projection)
+    : signatures_(signatures(likelihood, around, over)), products_(projection.of(signatures_.columns)) {
+  for (const Probe& p : signatures_.probes) judge(likelihood, p);
   for (const std::size_t mechanism : over) {
     if (knowledge_of(mechanism).signature != Signature::contact_bursts) continue;
     if (around.hypothesis.find(mechanism) != nullptr || not_testable(likelihood, around.hypothesis, mechanism))
@@ -123,20 +117,16 @@ Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, c
 
 /// Share of what a explains in its best direction that b's columns can follow, as a correlation.
 double Screen::alike(std::size_t a, std::size_t b) const {
-  const Probe &pa = best_[a], &pb = best_[b];
+  const Shape &shape_a = best_[a], &shape_b = best_[b];
+  const Probe &pa = shape_a.probe, &pb = shape_b.probe;
   const auto na = static_cast<Eigen::Index>(pa.parameters.size()), nb = static_cast<Eigen::Index>(pb.parameters.size());
   if (na == 0 || nb == 0) return 0;
-  Eigen::VectorXd x;
-  gain_of(pa, x);
-  double norm = 0;
-  Eigen::VectorXd toward = Eigen::VectorXd::Zero(nb);
-  for (Eigen::Index i = 0; i < na; ++i) {
-    for (Eigen::Index j = 0; j < na; ++j) norm += x[i] * x[j] * gram_(pa.first + i, pa.first + j);
-    for (Eigen::Index j = 0; j < nb; ++j) toward[j] += x[i] * gram_(pa.first + i, pb.first + j);
-  }
-  Eigen::MatrixXd g = gram_.block(pb.first, pb.first, nb, nb);
+  const Eigen::VectorXd x = with_ridge(shape_a.gram).ldlt().solve(toward(pa)),
+                        along = products_.gram(pb.first, nb, pa.first, na) * x;
+  const double norm = x.dot(shape_a.gram * x);
+  Eigen::MatrixXd g = shape_b.gram;
   for (Eigen::Index i = 0; i < nb; ++i) g(i, i) *= 1 + signature_numerics.ridge_share;
-  return norm > 0 ? std::sqrt(std::clamp(toward.dot(g.ldlt().solve(toward)) / norm, 0.0, 1.0)) : 0;
+  return norm > 0 ? std::sqrt(std::clamp(along.dot(g.ldlt().solve(along)) / norm, 0.0, 1.0)) : 0;
 }
 
 }  // namespace bms::diagnosis

@@ -30,6 +30,8 @@ class Screen {
  public:
   /// around: what is there already. over: mechanisms to judge; those in `around` are left out.
   Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over);
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
 
   /// Largest gain first.
   const std::vector<Candidate>& candidates() const { return candidates_; }
@@ -37,19 +39,25 @@ class Screen {
   double alike(std::size_t a, std::size_t b) const;
 
  private:
-  /// Gain of a probe's columns and their best strengths, to first order.
-  double gain_of(const Probe& probe, Eigen::VectorXd& strengths) const;
-  /// Standard deviation of a probe's first strength, its places free.
-  double sigma_of(const Probe& probe) const;
+  /// What a mechanism adds to the voltage at its best probe.
+  struct Shape {
+    Probe probe;           ///< without parameters if it has no columns
+    Eigen::MatrixXd gram;  ///< of the probe's columns, projected
+  };
+
+  Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over,
+         const ResidualProjection& projection);
+  /// Products of a probe's columns with the residual.
+  Eigen::VectorXd toward(const Probe& probe) const;
   void judge(const LikelihoodModel& likelihood, const Probe& probe);
   void judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit& around,
                     const ResidualProjection& projection, std::size_t mechanism);
   void sort();
 
+  SignatureSet signatures_;
+  ResidualProjection::Products products_;  ///< of the signatures' columns
   std::vector<Candidate> candidates_;
-  std::vector<Probe> best_;  ///< of each candidate; without parameters if it has no columns
-  Eigen::MatrixXd gram_;     ///< of all probes' columns, projected
-  Eigen::VectorXd toward_;   ///< their products with the residual
+  std::vector<Shape> best_;  ///< of each candidate
 };
 
 }  // namespace bms::diagnosis

@@ -77,7 +77,10 @@ HypothesisFit own_noise_fit(LikelihoodModel& likelihood, const NoiseModel& nomin
     double cost = 0;
     const NoiseModel noise =
         likelihood.likeliest_noise(likelihood.raw_residual(f.hypothesis, f.calibration), nominal, cost);
-    if (noise == f.noise) break;
+    if (noise == f.noise) {
+      f.likeliest_cost = cost;
+      break;
+    }
     likelihood.set_noise(noise);
     f = likelihood.fit(f.hypothesis, f.calibration, numerics.fit.refit_iterations);
   }
@@ -99,7 +102,10 @@ double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h) {
 
 double Search::total(const HypothesisFit& f) const {
   double cost = 0;
-  likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
+  if (f.likeliest_cost)
+    cost = *f.likeliest_cost;
+  else
+    likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
   return cost + f.cost - f.residual.squaredNorm();
 }
 
@@ -107,6 +113,15 @@ double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
   return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
+}
+
+void Search::learn_totals(const std::vector<HypothesisFit>& fits) {
+  std::vector<double> totals(fits.size());
+  measurement::in_parallel(fits.size(), [&](std::size_t k) {
+    const auto known = totals_.find(fits[k].cost);
+    totals[k] = known != totals_.end() ? known->second : total(fits[k]);
+  });
+  for (std::size_t k = 0; k < fits.size(); ++k) totals_[fits[k].cost] = totals[k];
 }
 
 HypothesisFit Search::with_own_noise(HypothesisFit f) { return own_noise_fit(likelihood_, nominal_, std::move(f)); }
@@ -205,6 +220,7 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
     const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
     fits.insert(fits.end(), here.begin(), here.end());
   }
+  learn_totals(fits);
   std::stable_sort(fits.begin(), fits.end(),
                    [&](const HypothesisFit& a, const HypothesisFit& b) { return score(a) < score(b); });
   return fits;

@@ -77,6 +77,8 @@ class Search {
  private:
   /// -2 log posterior with the noise model that the residual makes most probable, at its price.
   double total(const HypothesisFit& f) const;
+  /// The same of several, on all processors, for score().
+  void learn_totals(const std::vector<HypothesisFit>& fits);
   /// A candidate added to what is there, fitted from its estimate and from far starts. Called from several threads.
   HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
   /// The best of some strengths far from the signature's estimate; nothing if none is better than it.

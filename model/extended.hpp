@@ -79,6 +79,7 @@ struct MechanismSetting {
   std::size_t index = 0;  ///< in the catalogue
   MechanismValues<> value{};
   MechanismValues<> deviation{};  ///< standard deviations; 0: unknown, or the value was given
+  constexpr bool operator==(const MechanismSetting&) const = default;
 };
 
 /// Index of the first parameter whose value is outside its bounds or whose standard deviation is invalid; the number of

@@ -11,6 +11,7 @@ namespace bms::model {
 /// A time interval, both ends included.
 struct Span {
   double start_s = 0, end_s = 0;
+  constexpr bool operator==(const Span&) const = default;
 };
 
 struct ContactIntermittent {
