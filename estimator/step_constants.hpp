@@ -137,10 +137,10 @@ class StepConstants {
   arithmetic::TimeStep<S> duration_s_{};
   Variance soc_noise_{};
   Count correlated_samples_{1};
-  Coupling resistance_error_{}, known_error2_{}, temperature_error2_{};
-  Coupling resistance_noise_{}, known_noise_{}, relaxing_noise_{};
+  Coupling resistance_error_{}, resistance_noise_{};
   Fraction bank_share_{};
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
+  Coupling known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };
 
 }  // namespace bms::estimator
