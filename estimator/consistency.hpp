@@ -65,10 +65,14 @@ class Consistency {
   constexpr void add(const Voltage& deviation_v, const Voltage& overpotential_v, const Fraction& share) {
     mean_v_ = Voltage(mean_v_ + share * Voltage(deviation_v - mean_v_));
     overpotential_v_ = Voltage(overpotential_v_ + share * Voltage(overpotential_v - overpotential_v_));
+    loads_v2_ = Variance(Variance(loads_v2_ - arithmetic::product<Variance>(loads_v2_, share)) +
+                         arithmetic::product<Variance>(Variance(overpotential_v * overpotential_v), share));
   }
   constexpr Variance variance() const { return mean_v_ * mean_v_; }
   /// Square of the mean overpotential.
   constexpr Variance overpotential_v2() const { return overpotential_v_ * overpotential_v_; }
+  /// Mean square of the overpotential.
+  constexpr const Variance& loads_v2() const { return loads_v2_; }
 
   /// Returns true if the mean is so large, or not a number, that is_inconsistent() has to decide. Costs one comparison.
   constexpr bool is_suspect() const { return !(arithmetic::magnitude(mean_v_) <= Voltage(max_sigmas * min_error_v)); }
@@ -91,6 +95,7 @@ class Consistency {
   Voltage unchecked_below_v_{-1};
   std::uint64_t last_us_ = 0;  ///< time of the last check that was asked for
   Voltage mean_v_{}, overpotential_v_{};
+  Variance loads_v2_{};
   Variance expected_v2_{};
 };
 

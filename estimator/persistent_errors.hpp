@@ -36,6 +36,13 @@ class PersistentErrorsInSigma {
 
  public:
   static constexpr std::size_t values = 0;  ///< that an estimate reports
+  /// Time over which an unknown influence of the temperature on the resistances lasts: that of the weather.
+  static constexpr double temperature_lasts_s = 36'000;
+  /// Which square of the overpotential of the last half hour an unknown temperature makes uncertain: the time constants
+  /// are unknown as well, so a load and its return do not cancel.
+  static constexpr const Variance& past_load_v2(const Variance&, const Variance& mean_square_v2) {
+    return mean_square_v2;
+  }
 
   /// Process noise of the SOC in a step: white noise of the current sensor, and its slow error as a random walk.
   static constexpr Variance soc_noise(const Variance& white, const Noise& noise,
@@ -83,6 +90,11 @@ class PersistentErrorsAsStates {
 
  public:
   static constexpr std::size_t values = 3;  ///< voltage error, current offset, standard deviation of the offset
+  /// As long as the model's error, a state that takes up what lasts longer.
+  static constexpr double temperature_lasts_s = 0;
+  static constexpr const Variance& past_load_v2(const Variance& squared_mean_v2, const Variance&) {
+    return squared_mean_v2;
+  }
 
   static constexpr Variance soc_noise(const Variance& white, const Noise&, const arithmetic::TimeStep<S>&) {
     return white;

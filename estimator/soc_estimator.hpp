@@ -246,8 +246,9 @@ class SocEstimator {
     monitor_.watch(cell, constants_, state_, time_us_, above_ocv_v, innovation_v, measured);
     if (!monitor_.has_to_judge(soc, innovation_v)) return 0;
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
-    const std::uint32_t found = monitor_.judge(cell, input, constants_, soc, innovation_v,
-                                               monitor_.overpotential_v2(above_ocv_v, state_), interval_, state_);
+    const std::uint32_t found =
+        monitor_.judge(cell, input, constants_, soc, innovation_v,
+                       monitor_.resistance_error_v2(constants_, above_ocv_v, state_), interval_, state_);
     if (found != 0 || !monitor_.bank_is_open()) return found;
     std::uint8_t interval = interval_;
     observe(cell, look_up(operating_point(cell, input), soc, interval), input, innovation_v);

@@ -64,26 +64,33 @@ class SocMonitor {
     share_ = Consistency<S>::share_of(arithmetic::seconds<S>(Constants::capped(since_us)));
     if (measured)
       consistency_.add(Errors::with_error(state, innovation_v), Errors::without_error(state, above_ocv_v), share_);
-    reading_noise_v2_ = Variance(cell.noise.voltage_v2 + arithmetic::product<Variance>(consistency_.overpotential_v2(),
-                                                                                       constants.resistance_noise()));
+    const Variance mean_v2 = consistency_.overpotential_v2(),
+                   by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
+    reading_noise_v2_ = Variance(
+        cell.noise.voltage_v2 + Variance(arithmetic::product<Variance>(mean_v2, constants.known_noise()) +
+                                         arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
   }
 
   constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {
     return bank_.open() || is_suspect(soc, innovation_v);
   }
-  /// Square of the overpotential as its error counts.
-  constexpr Variance overpotential_v2(const Voltage& above_ocv_v, const State& state) const {
+  /// Variance of the present overpotential, and of what that of the last half hour left.
+  template <class Constants>
+  constexpr Variance resistance_error_v2(const Constants& constants, const Voltage& above_ocv_v,
+                                         const State& state) const {
     const Voltage present_v = Errors::without_error(state, above_ocv_v);
-    return Variance(present_v * present_v + consistency_.overpotential_v2());
+    const Variance mean_v2 = consistency_.overpotential_v2(), present_v2 = present_v * present_v,
+                   by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
+    return Variance(
+        arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2()) +
+        arithmetic::product<Variance>(Variance(present_v2 + by_temperature_v2), constants.temperature_error2()));
   }
 
   /// Returns 0 if the filter may use the voltage; else the flags of a voltage that it may not use. interval: of soc.
   template <class Cell, class Constants>
   constexpr std::uint32_t judge(const Cell& cell, const StepInput& input, const Constants& constants, const Soc& soc,
-                                const Voltage& innovation_v, const Variance& overpotential_v2, std::uint8_t interval,
+                                const Voltage& innovation_v, const Variance& of_resistances_v2, std::uint8_t interval,
                                 State& state) {
-    const Variance of_resistances_v2 = arithmetic::product<Variance>(
-        arithmetic::product<Variance>(overpotential_v2, constants.resistance_error()), constants.resistance_error());
     if (bank_.open() &&
         correct_from_bank(cell, input, constants, soc, innovation_v, of_resistances_v2, interval, state))
       return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};

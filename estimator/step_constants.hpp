@@ -2,7 +2,8 @@
 // changes, not in every step: duration, process noise of the SOC, decay of persistent errors, weights of the voltage.
 //
 // A voltage reading's own noise is independent from sample to sample; the model's error is not. An error that persists
-// for T seconds must count once per T, so at a step dt its variance is multiplied by T / dt (correlated_samples).
+// for T seconds must count once per T, so at a step dt its variance is multiplied by T / dt (correlated_samples). What
+// the temperature does to the resistances, beyond what the cell file knows, lasts as long as the weather.
 #pragma once
 
 #include <concepts>
@@ -29,6 +30,8 @@ class StepConstants {
  public:
   /// Range of TimeStep. The RC branch has settled after that.
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;
+  /// Time in which a polarisation relaxes whose time constant is not known.
+  static constexpr double relaxation_lasts_s = 1'800;
 
   constexpr std::uint64_t step_us() const { return step_us_; }
   constexpr const arithmetic::TimeStep<S>& duration_s() const { return duration_s_; }  ///< longest_step_us at most
@@ -36,8 +39,14 @@ class StepConstants {
   constexpr const Count& correlated_samples() const { return correlated_samples_; }    ///< >= 1
   /// Standard deviation of R0 + R1, relative.
   constexpr const Coupling& resistance_error() const { return resistance_error_; }
-  /// Variance of R0 + R1, relative, times correlated_samples.
+  /// Variance of R0 + R1, relative, times the number of samples over which each part of it lasts.
   constexpr const Coupling& resistance_noise() const { return resistance_noise_; }
+  /// The parts of its square: what the cell file states, and what the temperature adds.
+  constexpr const Coupling& known_error2() const { return known_error2_; }
+  constexpr const Coupling& temperature_error2() const { return temperature_error2_; }
+  /// The same as resistance_noise() for an overpotential that relaxes: what the cell file knows, and the temperature.
+  constexpr const Coupling& known_noise() const { return known_noise_; }
+  constexpr const Coupling& relaxing_noise() const { return relaxing_noise_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
   constexpr const typename Model::OptionalErrorDecay& error_decay() const { return error_decay_; }
 
@@ -50,7 +59,7 @@ class StepConstants {
     duration_s_ = arithmetic::seconds<S>(capped(step_us));
     const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
     correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
-    update_resistance_noise();
+    update_resistance_noise(noise);
     bank_share_ = correlated_samples > Count(SocBank<S>::points)
                       ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
                       : Fraction(SocBank<S>::max_share);
@@ -75,7 +84,7 @@ class StepConstants {
                                                                    cell.reference.energy_over_rt, cell.reference.c, c) -
                                                                Factor(1))));
     }
-    update_resistance_noise();
+    update_resistance_noise(cell.noise);
   }
 
   /// SOC by which the charge of a step may be wrong when the current was not measured: an unknown current flowed, and
@@ -98,9 +107,21 @@ class StepConstants {
         Factor((colder ? identified.per_colder : identified.per_hotter) * arithmetic::ratio<Fraction>(beyond, kelvin)));
   }
 
-  constexpr void update_resistance_noise() {
-    resistance_noise_ =
-        arithmetic::product<Coupling>(Coupling(resistance_error_ * resistance_error_), correlated_samples_);
+  constexpr void update_resistance_noise(const model::FilterNoise<S>& noise) {
+    const Coupling known(noise.resistance_error);
+    known_error2_ = Coupling(known * known);
+    known_noise_ = arithmetic::product<Coupling>(known_error2_, correlated_samples_);
+    // both have one sign for all loads, so standard deviations add: (k + t)^2 - k^2 is what t adds
+    temperature_error2_ = Coupling(Coupling(resistance_error_ - known) * Coupling(resistance_error_ + known));
+    resistance_noise_ = Coupling(
+        known_noise_ + arithmetic::product<Coupling>(temperature_error2_, samples_in(Errors::temperature_lasts_s)));
+    relaxing_noise_ = arithmetic::product<Coupling>(temperature_error2_, samples_in(relaxation_lasts_s));
+  }
+
+  /// Samples in a time, or in the correlation time of the model's error if that is longer.
+  constexpr Count samples_in(double time_s) const {
+    const auto count = arithmetic::ratio<Count>(arithmetic::Duration<S>(time_s), duration_s_);
+    return count > correlated_samples_ ? count : correlated_samples_;
   }
 
   /// Sum over the step of a rate per second, 1 at most.
@@ -119,6 +140,7 @@ class StepConstants {
   Coupling resistance_error_{}, resistance_noise_{};
   Fraction bank_share_{};
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
+  Coupling known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };
 
 }  // namespace bms::estimator

@@ -58,6 +58,7 @@ TEST(Consistency, ALoadInBothDirectionsLeavesNoOverpotential) {
   Consistency<double> monitor;
   for (int k = 0; k < 7'200; ++k) monitor.add(0, k % 2 == 0 ? 0.1 : -0.1, share);
   EXPECT_LT(monitor.overpotential_v2(), 1e-6);
+  EXPECT_NEAR(monitor.loads_v2(), 0.01, 2e-4) << "which counts where the time constants are unknown";
 }
 
 /// Seconds, from 1, whose samples are checked, and the time since the check before.

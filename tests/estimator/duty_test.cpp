@@ -31,5 +31,18 @@ TEST(Duty, FromColdStoreToSummer) {
   }
 }
 
+/// A cell file without temperature at -30 to -25 degrees C, where resistances are ten times those of the file: its
+/// sigma has to contain what it does not know.
+TEST(Duty, ACellFileWithoutTemperatureIsHonestInAColdStore) {
+  double inside = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const DutyFigures f =
+        duty<SocEstimator<float>>(tests::prepared<float>(), {}, {.winter_c = -30, .summer_c = -25}, seed, 48);
+    EXPECT_LT(f.largest_sigma, 0.15) << seed;
+    inside += f.inside / 3;
+  }
+  EXPECT_GT(inside, 0.9);
+}
+
 }  // namespace
 }  // namespace bms::estimator

@@ -23,7 +23,7 @@ std::uint32_t flags_at(double soc, double sigma) {
   monitor.start(cell);
   monitor.watch(cell, constants, state, 1'000'000, 0, 0, true);
   if (!monitor.has_to_judge(soc, 0)) return 0;
-  return monitor.judge(cell, {0, 1, 25}, constants, soc, 0, monitor.overpotential_v2(0, state), 0, state);
+  return monitor.judge(cell, {0, 1, 25}, constants, soc, 0, monitor.resistance_error_v2(constants, 0, state), 0, state);
 }
 
 TEST(SocMonitor, ContradictsASocThatNoCellCanHave) {

@@ -52,7 +52,10 @@ TEST(StepConstants, ColdAndHeatMakeResistancesUncertainThatFollowNoTemperature) 
   c.set_temperature(cell, -500);
   const double more = std::exp(40'000 / 8.314462618 * (1 / 268.15 - 1 / 298.15)) - 1;
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + more, 1e-6);
-  EXPECT_NEAR(c.resistance_noise(), std::pow(c.resistance_error(), 2) * c.correlated_samples(), 1e-9);
+  const double known = cell.noise.resistance_error, by_temperature = std::pow(known + more, 2) - known * known;
+  EXPECT_NEAR(c.temperature_error2(), by_temperature, 1e-4);
+  EXPECT_NEAR(c.resistance_noise(), known * known * c.correlated_samples() + by_temperature * 36'000, 1)
+      << "the weather lasts for ten hours";
   c.set_temperature(cell, measurement::no_temperature);
   EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error);
 }
