@@ -26,6 +26,7 @@ class StepConstants {
   using Temperature = arithmetic::Temperature<S>;
   using Factor = arithmetic::Factor<S>;
   using TimeStep = arithmetic::TimeStep<S>;
+  using Duration = arithmetic::Duration<S>;
 
  public:
   /// Range of TimeStep. The RC branch has settled after that.
@@ -113,14 +114,15 @@ class StepConstants {
     known_noise_ = arithmetic::product<Coupling>(known_error2_, correlated_samples_);
     // both have one sign for all loads, so standard deviations add: (k + t)^2 - k^2 is what t adds
     temperature_error2_ = Coupling(Coupling(resistance_error_ - known) * Coupling(resistance_error_ + known));
-    resistance_noise_ = Coupling(
-        known_noise_ + arithmetic::product<Coupling>(temperature_error2_, samples_in(Errors::temperature_lasts_s)));
-    relaxing_noise_ = arithmetic::product<Coupling>(temperature_error2_, samples_in(relaxation_lasts_s));
+    resistance_noise_ =
+        Coupling(known_noise_ +
+                 arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(Errors::temperature_lasts_s))));
+    relaxing_noise_ = arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(relaxation_lasts_s)));
   }
 
   /// Samples in a time, or in the correlation time of the model's error if that is longer.
-  constexpr Count samples_in(double time_s) const {
-    const auto count = arithmetic::ratio<Count>(arithmetic::Duration<S>(time_s), duration_s_);
+  constexpr Count samples_in(const Duration& time_s) const {
+    const auto count = arithmetic::ratio<Count>(time_s, duration_s_);
     return count > correlated_samples_ ? count : correlated_samples_;
   }
 
