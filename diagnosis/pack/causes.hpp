@@ -23,7 +23,6 @@ enum Parameter : std::size_t {
   delay,          ///< of the voltage channel against the neighbours [s]
   temperature,    ///< change of the resistances per kelvin of difference to the mean of the sensors [1/K]
   blur,           ///< response to changes of the current within a few rows: not read at the moment of the neighbours
-  course,         ///< of what the cell file says the resistances change with the cell's own state of charge
   shape_1,        ///< the OCV curve of this cell differs by cos(pi soc) [V]
   shape_2,        ///< ... by cos(2 pi soc)
   shape_3,        ///< ... by cos(3 pi soc)

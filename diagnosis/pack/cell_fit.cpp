@@ -143,14 +143,14 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[delay] = -late.slope_v_per_s;
     row[temperature] = warmer_k * all_v;
     row[blur] = t.r0_ohm * (current_a - delayed.between(t.slow_a));
-    row[course] = (to.r0_ohm / from.r0_ohm - 1) * t.r0_by_row_ohm[then] * current_a +
-                  (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then];
+    const double course_v = (to.r0_ohm / from.r0_ohm - 1) * t.r0_by_row_ohm[then] * current_a +
+                            (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then];
     const double shape_v = set_shapes(t.soc[then] + dz, theta, row);
-    const double explained_v = to.ocv_v - from.ocv_v + (1 + theta[course]) * row[course] + theta[blur] * row[blur] +
-                               theta[resistance] * all_v + theta[polarisation] * t.v_rc_v[then] +
-                               theta[time_constant] * tau_v + theta[tilt] * row[tilt] + theta[joint] * current_a +
-                               theta[offset] + theta[gain] * late.v + theta[slope] * row[slope] + late.v -
-                               t.smooth_v[k] + theta[temperature] * warmer_k * all_v + shape_v;
+    const double explained_v = to.ocv_v - from.ocv_v + course_v + theta[blur] * row[blur] + theta[resistance] * all_v +
+                               theta[polarisation] * t.v_rc_v[then] + theta[time_constant] * tau_v +
+                               theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] +
+                               theta[gain] * late.v + theta[slope] * row[slope] + late.v - t.smooth_v[k] +
+                               theta[temperature] * warmer_k * all_v + shape_v;
     row[parameter_count] = difference_v - explained_v;
     out.difference_v[k] = difference_v;
     out.usable[k] = 1;

@@ -40,7 +40,6 @@ struct PackThresholds {
       {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
       {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
       {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},       // blur: of R0; follows from the times at which channels are read
-      {0.2, 0, 0, 0, 1, 0},                    // course: error of a table's slope
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},       // shapes of the OCV curve: healthy cells age differently
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
