@@ -37,6 +37,18 @@ bool lists(const dp::PackFinding& f, const truth::PackFault& fault) {
   });
 }
 
+/// Returns true if the matrix says that the recording does not separate this finding's cause from the fault.
+bool cannot_be_separated(const dp::PackFinding& f, const truth::PackFault& fault, const dp::Isolability& matrix) {
+  const auto place_of = [&](std::string_view id) {
+    const auto found = std::find_if(matrix.causes.begin(), matrix.causes.end(),
+                                    [&](dp::Cause cause) { return dp::text_of(cause).id == id; });
+    return static_cast<std::size_t>(found - matrix.causes.begin());
+  };
+  const std::size_t a = place_of(dp::id_of(f)), b = place_of(fault.id);
+  if (a >= matrix.separable.size() || b >= matrix.separable.size()) return false;
+  return !matrix.separable[a][b] || !matrix.separable[b][a];
+}
+
 PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis& d) {
   PlantedOutcome o;
   o.fault = fault;
@@ -48,25 +60,27 @@ PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis
       o.after_s = f.after_s.value_or(0);
     } else if (lists(f, fault)) {
       o.listed = true;
+      o.foretold = cannot_be_separated(f, fault, d.isolability);
     }
     if (!touches(fault, f)) continue;
     o.cell_right = true;
     if (!is_about(f, fault)) o.instead += dp::sentence_of(f) + " " + dp::rivals_text(f);
   }
   o.listed = o.listed && !o.named;
+  o.foretold = o.foretold && o.listed;
   return o;
 }
 
 struct Count {
-  std::size_t planted = 0, named = 0, listed = 0, another = 0, missed = 0, sized = 0;
+  std::size_t planted = 0, named = 0, listed = 0, foretold = 0, another = 0, missed = 0, sized = 0;
   std::vector<double> after_s;
 };
 
 std::string row_of(const std::string& name, Count c) {
   std::sort(c.after_s.begin(), c.after_s.end());
   const std::string time = c.after_s.empty() ? "" : fmt::format("{:.0f} min", c.after_s[c.after_s.size() / 2] / 60);
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed, c.another,
-                     c.missed, c.sized, time);
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed, c.foretold,
+                     c.another, c.missed, c.sized, time);
 }
 
 }  // namespace
@@ -112,6 +126,7 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
         ++c->planted;
         c->named += p.named ? 1 : 0;
         c->listed += p.listed ? 1 : 0;
+        c->foretold += p.foretold ? 1 : 0;
         const bool found = p.named || p.listed;
         c->another += !found && p.cell_right ? 1 : 0;
         c->missed += !found && !p.cell_right ? 1 : 0;
@@ -122,8 +137,10 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
     if (!o.healthy && complete) ++whole;
   }
   std::string text =
-      "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | another cause for this cell | missed | "
-      "right, size within 2 sigma | median time to name |\n|---|---|---|---|---|---|---|---|\n";
+      "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | of these, not separable by the matrix "
+      "| "
+      "another cause for this cell | missed | right, size within 2 sigma | median time to name |\n"
+      "|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [id, count] : by_cause) text += row_of("`" + id + "`", count);
   text += row_of("**physics and sensors**", all) + row_of("**faults of the data**", data);
   text += fmt::format(
@@ -144,6 +161,7 @@ std::string pack_json(const std::vector<PackOutcome>& outcomes) {
                          {"size", p.fault.size},
                          {"named", p.named},
                          {"listed", p.listed},
+                         {"foretold", p.foretold},
                          {"cell_right", p.cell_right},
                          {"found", p.found},
                          {"pull", p.pull},

@@ -15,6 +15,7 @@ struct PlantedOutcome {
   truth::PackFault fault;
   bool named = false;       ///< cell and cause right, as the first answer
   bool listed = false;      ///< not first, but among what else it could be: the answer is AMBIGUOUS
+  bool foretold = false;    ///< listed, and the matrix of the diagnosis says that this recording cannot separate them
   bool cell_right = false;  ///< the cell, with any cause
   std::string instead;      ///< what was said of this cell, if another cause was named first
   double found = 0;         ///< size, if named

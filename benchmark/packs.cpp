@@ -1,6 +1,6 @@
 // Diagnoses simulated packs (truth/packs.hpp) and scores the answers.
 //
-//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--json FILE] [--readme FILE] [--write FOLDER]
+//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--reversed] [--json FILE] [--readme FILE] [--write FOLDER]
 #include <atomic>
 #include <filesystem>
 #include <mutex>
@@ -27,7 +27,7 @@ struct Options {
   std::uint64_t seed = 1;
   std::size_t faulty = 60, healthy = 60, first = 0;
   unsigned jobs = 1;
-  bool no_shared = false;
+  bool no_shared = false, reversed = false;
   std::string json, readme, write;
 };
 
@@ -73,6 +73,12 @@ void write_case(const std::filesystem::path& folder, std::size_t k, const truth:
   bms::files::write_file((folder / (name + ".toml")).string(), truth::cell_toml(c.cell, name));
 }
 
+/// Its current sensor is connected the wrong way round, in addition to its other faults.
+void reverse(truth::PackCase& c) {
+  for (double& a : c.recording.current_a) a = -a;
+  c.faults.push_back({.id = "current_sign", .cell = {}, .size = 1});
+}
+
 void run(const Options& o) {
   const std::size_t count = o.faulty + o.healthy;
   std::vector<PackOutcome> outcomes(count);
@@ -82,7 +88,8 @@ void run(const Options& o) {
     for (std::size_t k = next++; k < count; k = next++) {
       const bool healthy = k >= o.faulty;
       const std::size_t index = o.first + (healthy ? k - o.faulty : k);
-      const truth::PackCase c = truth::make_pack(o.seed, index, healthy);
+      truth::PackCase c = truth::make_pack(o.seed, index, healthy);
+      if (o.reversed) reverse(c);
       if (!o.write.empty()) write_case(o.write, index, c);
       outcomes[k] = run_pack(c, !o.no_shared);
       const std::scoped_lock lock(printing);
@@ -111,6 +118,7 @@ int main(int argc, char** argv) {
   app.add_option("--first", o.first, "index of the first pack")->capture_default_str();
   app.add_option("--jobs", o.jobs, "packs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
   app.add_flag("--no-shared", o.no_shared, "do not diagnose the mean of the cells: faster");
+  app.add_flag("--reversed", o.reversed, "reverse the sign of every current sensor");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme, "write the table between '<!-- figures: packs -->' and its end")
       ->type_name("FILE");

@@ -7,7 +7,9 @@
 #include <fmt/format.h>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/pack/current_sign.hpp"
 #include "diagnosis/pack/pack_texts.hpp"
+#include "diagnosis/pack/pack_thresholds.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
@@ -70,6 +72,19 @@ std::optional<host_sim::SocPrior> start_of(const measurement::Recording& r, cons
   if (!r.soc_ref.empty() && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1)
     return host_sim::SocPrior{r.soc_ref.front(), car_soc_sigma};
   return std::nullopt;
+}
+
+/// Turns a reversed current, so that the rest of the diagnosis is possible.
+std::optional<dp::PackFinding> turn_current(measurement::Recording& r, const files::CellFile& cell) {
+  std::vector<std::vector<double>> cell_v;
+  for (const measurement::Column& c : r.cell_voltage_v) cell_v.push_back(c.copy());
+  std::vector<double> current_a = r.current_a.copy();
+  const double quiet_a = dp::limits.channels.step_c * cell.parameters.capacity_ah;
+  std::optional<dp::PackFinding> found = dp::reversed_current(current_a, cell_v, quiet_a);
+  if (!found) return found;
+  for (double& a : current_a) a = -a;
+  r.current_a = std::move(current_a);
+  return found;
 }
 
 dp::PackRecording pack_of(const measurement::Recording& r, const files::CellFile& cell,
@@ -162,6 +177,7 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
   r.cell = cell;
   r.recording = std::move(recording);
   r.warnings = r.recording.warnings;
+  const std::optional<dp::PackFinding> reversed = turn_current(r.recording, cell);
   r.pack = pack_of(r.recording, cell, options.initial_soc);
   dp::PackOptions of_cells;
   of_cells.progress = [&](double done, const std::string& what) {
@@ -175,6 +191,7 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
                                                                "by more than a cell can change; they are left out",
                                                                c + 1, count)});
   }
+  if (reversed) r.diagnosis.findings.push_back(*reversed);
   r.shared = options.shared ? not_shared(r) : "Not tested: not wanted.";
   if (r.shared.empty()) add_shared(r, options.initial_soc, options.progress);
   dp::conclude(r.diagnosis);

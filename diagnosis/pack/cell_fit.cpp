@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -57,11 +58,14 @@ struct Linearised {
   std::vector<char> usable;
   std::vector<double> difference_v;
 
+  std::vector<double> soc;  ///< of the cell
+
   explicit Linearised(std::size_t rows)
       : columns(Columns::Zero(static_cast<Eigen::Index>(rows), parameter_count + 1)),
         noise(rows),
         usable(rows, 0),
-        difference_v(rows, no_value) {}
+        difference_v(rows, no_value),
+        soc(rows, no_value) {}
 };
 
 double change_of_soc(const Track& t, const Vector& theta, std::size_t k) {
@@ -79,11 +83,25 @@ void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di
   noise.edge_v2[k] = square((n.edge_share + n.shape_share * added_share) * t.r0_ohm * di);
   const double independent = -std::expm1(-square(dz / n.ocv_reach));
   const double soc = t.soc[delayed.row] + dz, beyond = std::max({0.0, n.lowest_soc - soc, soc - n.highest_soc});
+  const double unknown_ohm = n.beyond_resistance * beyond * t.r0_ohm;
+  noise.edge_v2[k] += square(unknown_ohm * di / edge);
   noise.slow_v2[k] = square(n.track_soc * steeper_v) + square((n.ocv_axis + n.beyond_axis * beyond) * slope_v) +
-                     2 * square(t.ocv_tolerance_v) * independent;
+                     2 * square(t.ocv_tolerance_v) * independent + square(unknown_ohm * t.instant_a[delayed.row]);
   // a step of the voltage lies before or after the moment of sampling, not in between; the whitener multiplies by
   // edge^2
   noise.white_v2[k] = delayed.share_of_step * (1 - delayed.share_of_step) * square(delayed.step_v / edge);
+}
+
+/// Sets the columns of the OCV curve's shape; returns what theta says of it.
+double set_shapes(double soc, const Vector& theta, Eigen::Ref<Eigen::RowVectorXd> row) {
+  const double wave = std::cos(std::numbers::pi * soc);
+  double before = 1, now = wave, sum_v = 0;
+  for (const Eigen::Index p : std::array<Eigen::Index, 4>{shape_1, shape_2, shape_3, shape_4}) {
+    row[p] = now;
+    sum_v += theta[p] * now;
+    before = std::exchange(now, 2 * wave * now - before);  // cos((n + 1) x) = 2 cos(x) cos(n x) - cos((n - 1) x)
+  }
+  return sum_v;
 }
 
 Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
@@ -91,15 +109,15 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
   const Track& t = *input.track;
   const std::vector<double>& v = pack.cell_v[input.cell];
   Linearised out(pack.rows());
-  Delayed delayed(pack.time_s, t.neighbours_v, theta[delay]);
+  Delayed delayed(pack.time_s, t.smooth_v, theta[delay]);
   std::uint8_t here = 0, there = 0;
   double last_a = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     const Delayed::Value late = delayed.at(k);
-    const double current_a = delayed.between(t.instant_a), neighbours_v = t.neighbours_v[k];
+    const double current_a = delayed.between(t.instant_a);
     const double di = pack.current_a[k] - last_a;
     if (std::isfinite(pack.current_a[k])) last_a = pack.current_a[k];
-    const double difference_v = v[k] - neighbours_v;
+    const double difference_v = v[k] - t.neighbours_v[k];
     if (!std::isfinite(difference_v + current_a + late.v + di)) continue;
     const std::size_t then = late.row;  // when the channel was sampled
     const double dz = change_of_soc(t, theta, then);
@@ -124,27 +142,26 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[slope] = late.v - t.mean_v;
     row[delay] = -late.slope_v_per_s;
     row[temperature] = warmer_k * all_v;
-    double shape_v = 0;
-    for (const Eigen::Index p : std::array<Eigen::Index, 4>{shape_1, shape_2, shape_3, shape_4}) {
-      const double half_waves = static_cast<double>(p) - static_cast<double>(shape_1) + 1;
-      row[p] = std::cos(std::numbers::pi * half_waves * (t.soc[then] + dz));
-      shape_v += theta[p] * row[p];
-    }
-    const double explained_v =
-        to.ocv_v - from.ocv_v + (to.r0_ohm - from.r0_ohm) * current_a + (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then] +
-        theta[resistance] * all_v + theta[polarisation] * t.v_rc_v[then] + theta[time_constant] * tau_v +
-        theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] + theta[gain] * late.v +
-        theta[slope] * row[slope] + late.v - neighbours_v + theta[temperature] * warmer_k * all_v + shape_v;
+    row[blur] = t.r0_ohm * (current_a - delayed.between(t.slow_a));
+    const double course_v = (to.r0_ohm / from.r0_ohm - 1) * t.r0_by_row_ohm[then] * current_a +
+                            (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then];
+    const double shape_v = set_shapes(t.soc[then] + dz, theta, row);
+    const double explained_v = to.ocv_v - from.ocv_v + course_v + theta[blur] * row[blur] + theta[resistance] * all_v +
+                               theta[polarisation] * t.v_rc_v[then] + theta[time_constant] * tau_v +
+                               theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] +
+                               theta[gain] * late.v + theta[slope] * row[slope] + late.v - t.smooth_v[k] +
+                               theta[temperature] * warmer_k * all_v + shape_v;
     row[parameter_count] = difference_v - explained_v;
     out.difference_v[k] = difference_v;
     out.usable[k] = 1;
+    out.soc[k] = t.soc[then] + dz;
     add_row_noise(t, theta, k, di, slope_v, slope_v - from.ocv_delta_v * from.per_width, dz, late, edge, out.noise);
   }
   return out;
 }
 
 /// Sums of products up to each checkpoint, for the data with what theta explains added again.
-void add_information(const FitInput& input, const Linearised& l, CellFit& fit) {
+void add_information(const FitInput& input, CellFit& fit) {
   const auto rows = static_cast<Eigen::Index>(input.pack->rows());
   const Eigen::Index checkpoints = static_cast<Eigen::Index>(limits.checkpoints);
   Information sum;
@@ -153,16 +170,40 @@ void add_information(const FitInput& input, const Linearised& l, CellFit& fit) {
   for (Eigen::Index c = 1; c <= checkpoints; ++c) {
     const Eigen::Index to = rows * c / checkpoints;
     if (to == from) continue;
-    const auto block = l.columns.middleRows(from, to - from);
+    const auto block = fit.white.middleRows(from, to - from);
     const auto columns = block.leftCols<parameter_count>();
-    const Matrix products = columns.transpose() * columns;
+    Matrix products = Matrix::Zero();
+    products.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
+    products.triangularView<Eigen::StrictlyUpper>() = products.transpose();
     sum.of_parameters += products;
     sum.with_data += columns.transpose() * block.col(parameter_count) + products * fit.theta;
     sum.until_s = input.pack->time_s[static_cast<std::size_t>(to - 1)];
     fit.until.push_back(sum);
     from = to;
   }
-  fit.square = l.columns.col(parameter_count).squaredNorm();
+}
+
+/// Reduces the weight of rows by how much larger the residual is than its noise, where the cell had this state of
+/// charge: there, the model is not as exact as between typical cells, and the information is less.
+void weigh_by_misfit(CellFit& fit) {
+  constexpr const PackThresholds::Misfit& m = limits.misfit;
+  const auto bin_of = [&](std::size_t k) {
+    return static_cast<std::size_t>(std::clamp(fit.soc[k], 0.0, 1.0) * static_cast<double>(m.bins - 1));
+  };
+  std::array<double, m.bins> squares, rows;
+  squares.fill(m.prior_rows);  // of variance 1
+  rows.fill(m.prior_rows);
+  for (std::size_t k = 0; k < fit.soc.size(); ++k) {
+    if (!std::isfinite(fit.soc[k])) continue;
+    const double residual = fit.white(static_cast<Eigen::Index>(k), parameter_count);
+    squares[bin_of(k)] += residual * residual;
+    ++rows[bin_of(k)];
+  }
+  for (std::size_t k = 0; k < fit.soc.size(); ++k) {
+    if (!std::isfinite(fit.soc[k])) continue;
+    const double ratio = squares[bin_of(k)] / rows[bin_of(k)];
+    if (ratio > 1) fit.white.row(static_cast<Eigen::Index>(k)) /= std::sqrt(ratio);
+  }
 }
 
 /// Linearised and whitened around theta; cost: -2 log posterior but for a constant.
@@ -179,15 +220,18 @@ CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, 
   }
   whitener.whiten(l.columns);
   fit.used = whitener.used();
-  add_information(input, l, fit);
+  fit.white = std::move(l.columns);
+  fit.soc = std::move(l.soc);
+  fit.square = fit.white.col(parameter_count).squaredNorm();
+  add_information(input, fit);
   fit.cost = fit.square + whitener.log_determinant() + (theta.array() / prior.array()).square().sum();
   return fit;
 }
 
-Vector most_probable(const Information& data, const Vector& prior) {
+Matrix normal_of(const Information& data, const Vector& prior) {
   Matrix normal = data.of_parameters;
   normal.diagonal() += prior.array().square().inverse().matrix();
-  return normal.ldlt().solve(data.with_data);
+  return normal;
 }
 
 }  // namespace
@@ -231,8 +275,14 @@ Vector starting_point(const FitInput& input, double lag_s) {
 
 CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior, const NoiseModel& noise) {
   const auto at = [&](const Vector& theta) { return around(input, theta, prior, noise); };
-  return damped_fit(at(start), &CellFit::theta, limits.fit.iterations, at,
-                    [&](const CellFit& fit) { return most_probable(fit.all(), prior); });
+  const auto normal = [&](const CellFit& fit) { return normal_of(fit.all(), prior); };
+  const auto target = [&](const CellFit& fit) -> Vector { return normal(fit).ldlt().solve(fit.all().with_data); };
+  CellFit fit = damped_fit(at(start), &CellFit::theta, limits.fit.iterations, at, normal, target);
+  weigh_by_misfit(fit);
+  add_information(input, fit);
+  fit.white.resize(0, 0);
+  fit.soc = {};
+  return fit;
 }
 
 NoiseModel noise_of(const FitInput& input, const CellFit& fit) {

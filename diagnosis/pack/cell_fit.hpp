@@ -3,7 +3,7 @@
 //   v_cell(t) - v_neighbours(t) = p(t; theta) + noise        theta: the parameters of causes.hpp
 //
 //   p = OCV(z + dz) - OCV(z) + (R0(z + dz) - R0(z)) I + resistance (R0 I + v_rc) + polarisation v_rc + joint I
-//       + offset + gain v_neighbours + [v_neighbours(t - delay) - v_neighbours(t)]
+//       + offset + gain v_neighbours + [v_neighbours(t - delay) - v_neighbours(t)] + blur R0 (I - mean of I around t)
 //   dz = charge + capacity (z(t) - z(0)) - leak t
 //
 // All causes of a cell share these columns. A hypothesis is a prior: a parameter that is healthy has the spread of the
@@ -42,6 +42,8 @@ struct CellFit {
   std::vector<Information> until;    ///< at checkpoints; the last one has all rows
   std::vector<double> difference_v;  ///< to the neighbours; NaN: not used
   std::vector<double> residual_v;    ///< without what theta explains; NaN: not used
+  Columns white;                     ///< while it is fitted: the columns of the parameters, and last the residual
+  std::vector<double> soc;           ///< the same: of the cell, by row
   std::size_t used = 0;
   double cost = 0;    ///< -2 log posterior of theta but for a constant
   double square = 0;  ///< of the white difference, with all rows

@@ -12,6 +12,7 @@
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/selection.hpp"
 #include "diagnosis/pack/sensors.hpp"
 #include "diagnosis/pack/shared_current.hpp"
 #include "diagnosis/pack/unexplained.hpp"
@@ -48,7 +49,7 @@ Vector prior_of(const State& s, std::size_t cell, bool anything) {
   const Vector fault = fault_spread(s.track.r0_ohm);
   Vector prior = s.healthy;
   for (Eigen::Index p = 0; anything && p < prior.size(); ++p) prior[p] = std::hypot(s.healthy[p], fault[p]);
-  for (const Cause cause : {Cause::resistance, Cause::capacity}) {
+  for (const Cause cause : {Cause::resistance, Cause::capacity, Cause::late}) {
     if (anything) widen_for(cause, s.healthy, s.track.r0_ohm, prior);
   }
   for (const Accusation& a : s.accused) {
@@ -245,12 +246,13 @@ std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likel
   const double sigma = measurement::median(sigmas);
   const double spread = s.healthy[delay];
   if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
-  // from the first to the last one, without single late channels
+  // from the first to the last one: from those between single late channels, as if they were evenly spread
   std::sort(delays.begin(), delays.end());
   const std::size_t few = delays.size() / (2 * limits.unexplained.cells);
   PackFinding f;
   f.cause = Cause::staggered;
-  f.value = delays[delays.size() - 1 - few] - delays[few];
+  const double last = static_cast<double>(delays.size() - 1), used = last - 2 * static_cast<double>(few);
+  f.value = (delays[delays.size() - 1 - few] - delays[few]) * last / used;
   f.sigma = std::hypot(sigma, sigma, limits.spread[delay].scale * f.value);
   f.gain = spread / sigma;
   f.probability = 1;

@@ -26,28 +26,6 @@ bool only_positive(Cause cause) {
   return cause == Cause::capacity || cause == Cause::leakage || cause == Cause::resistance || cause == Cause::joint;
 }
 
-/// Without one of them.
-std::vector<Accusation> without(std::vector<Accusation> list, const Accusation& one) {
-  std::erase(list, one);
-  return list;
-}
-
-std::vector<Accusation> with(std::vector<Accusation> list, const Accusation& one) {
-  list.push_back(one);
-  return list;
-}
-
-/// What a further cause in the same cell must gain in addition: the model of the first one is not exact.
-double price(const PackLikelihood& likelihood, const std::vector<Accusation>& others, const Accusation& added) {
-  double sum = 0;
-  for (const Accusation& o : others) {
-    if (!added.touches(o.cell) && !o.touches(added.cell)) continue;
-    sum += limits.further_in_cell +
-           limits.share_of_first * std::max(0.0, likelihood.gain(without(others, o), o, likelihood.last_checkpoint()));
-  }
-  return sum;
-}
-
 /// Share of the cells that are taken for healthy. A median would overlook channels that are read in two groups, and
 /// heavy tails.
 double usual_share(std::size_t cells) {
@@ -87,6 +65,7 @@ void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eig
     const Spread& spread = limits.spread[static_cast<std::size_t>(k)];
     if (cause == Cause::resistance) prior[k] = std::hypot(prior[k], spread.aged);
     if (moved) prior[k] = std::hypot(prior[k], spread.moved);
+    if (cause == Cause::late) prior[k] = std::hypot(prior[k], spread.late);
   }
 }
 
@@ -159,7 +138,8 @@ std::vector<std::size_t> PackLikelihood::cells_of(const std::vector<Accusation>&
 
 double PackLikelihood::gain(const std::vector<Accusation>& others, const Accusation& added,
                             std::size_t checkpoint) const {
-  const std::vector<Accusation> all = with(others, added);
+  std::vector<Accusation> all = others;
+  all.push_back(added);
   const std::vector<std::size_t> cells = cells_of(all, added);
   return of(all, cells, checkpoint) - of(others, cells, checkpoint);
 }
@@ -244,57 +224,6 @@ Vector healthy_spread(const std::vector<CellFit>& fits, double r0_ohm) {
     }
   }
   return spread;
-}
-
-std::vector<Accusation> select(const PackLikelihood& likelihood, const std::vector<Accusation>& certain) {
-  const std::size_t now = likelihood.last_checkpoint();
-  std::vector<Accusation> chosen = certain;
-  const auto is_certain = [&](const Accusation& a) {
-    return std::find(certain.begin(), certain.end(), a) != certain.end();
-  };
-  const auto possible = [&](const std::vector<Accusation>& others, const Accusation& a) {
-    const auto alike = [&](const Accusation& o) { return o.cell == a.cell && are_alike(o.cause, a.cause); };
-    if (std::any_of(others.begin(), others.end(), alike)) return false;
-    return likelihood.is_possible(a, likelihood.size(with(others, a), a, now));
-  };
-  const auto exchange = [&] {
-    for (Accusation& a : chosen) {
-      if (is_certain(a)) continue;
-      const std::vector<Accusation> others = without(chosen, a);
-      double best = likelihood.gain(others, a, now);
-      for (const Accusation& rival : likelihood.rivals_of(a)) {
-        if (std::find(chosen.begin(), chosen.end(), rival) != chosen.end()) continue;
-        const double gain = likelihood.gain(others, rival, now);
-        if (gain <= best || !possible(others, rival)) continue;
-        best = gain;
-        a = rival;
-      }
-    }
-  };
-  while (chosen.size() < limits.most_causes) {
-    Accusation found;
-    double best = likelihood.least_gain();
-    bool any = false;
-    for (std::size_t cell = 0; cell < likelihood.cells(); ++cell) {
-      for (const Accusation& a : likelihood.candidates_at(cell)) {
-        if (std::find(chosen.begin(), chosen.end(), a) != chosen.end()) continue;
-        const double gain = likelihood.gain(chosen, a, now) - price(likelihood, chosen, a);
-        if (gain <= best || !possible(chosen, a)) continue;
-        best = gain;
-        found = a;
-        any = true;
-      }
-    }
-    if (!any) break;
-    chosen.push_back(found);
-    exchange();
-  }
-  std::erase_if(chosen, [&](const Accusation& a) {
-    if (is_certain(a)) return false;
-    const std::vector<Accusation> others = without(chosen, a);
-    return likelihood.gain(others, a, now) < likelihood.least_gain() || !possible(others, a);
-  });
-  return chosen;
 }
 
 }  // namespace bms::diagnosis::pack

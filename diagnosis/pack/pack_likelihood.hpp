@@ -80,10 +80,6 @@ Vector fault_spread(double r0_ohm);
 /// Widens the prior of a cell's parameters, standard deviations, for this cause in the cell.
 void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eigen::VectorXd> prior);
 
-/// The most probable accusations: added one by one, exchanged for a better one, removed if they are not needed.
-/// certain: faults of the data that were recognised before; they stay.
-std::vector<Accusation> select(const PackLikelihood& likelihood, const std::vector<Accusation>& certain);
-
 /// ln Z for any information, data and prior.
 double log_marginal(const Eigen::MatrixXd& information, const Eigen::VectorXd& with_data, const Eigen::VectorXd& prior);
 

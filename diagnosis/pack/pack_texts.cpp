@@ -70,6 +70,10 @@ constexpr std::array texts = {
     CauseText{"all_capacity", "a capacity of all cells that differs from the cell file", "loss", "1",
               "The pack has aged as a whole, or its cell file describes another cell.",
               "Measure the capacity of the pack and identify the cell file again."},
+    CauseText{"current_sign", "a current sensor with a reversed sign", "share", "1",
+              "The voltage of the cells falls when the reading rises. The state of charge goes the wrong way.",
+              "Check the direction of the sensor and the sign in the logger. Positive current charges. The diagnosis "
+              "used the reversed current."},
 };
 
 /// Factor and unit for a reader.
@@ -125,6 +129,8 @@ std::string relation_of(const PackFinding& f) {
       return "between readings";
     case Cause::staggered:
       return "from the first to the last channel";
+    case Cause::current_sign:
+      return "of the changes of the current show it";
     default:
       return "of the rows";
   }

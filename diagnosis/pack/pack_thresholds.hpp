@@ -20,6 +20,7 @@ struct Spread {
   double scale;      ///< relative error of a size: what all cells share is not known better
   double aged = 0;   ///< in a cell with a higher resistance: R0 and R1 do not grow alike; a joint changes neither
   double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve do not cancel
+  double late = 0;   ///< in a cell whose channel is late: what happened within the row is not known
 };
 
 struct PackThresholds {
@@ -32,12 +33,13 @@ struct PackThresholds {
       {0.05, 0, 0, 0, 4, 0, 0.15},             // polarisation: no cause of its own
       {0.05, 0, 0, 0, 4, 0, 0.3},              // time constant
       {0.02, 0, 0, 0, 6, 0, 0.15},             // tilt
-      {0.02, 0.5, 0.12, 0.3, 1.5, 0.05},       // joint
+      {0.02, 0.5, 0.12, 0.3, 5, 0.05},         // joint
       {0.001, 0.03, 0.004, 0.010, 12, 0.02},   // offset: what a monitor's datasheet states
       {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},  // gain: as stated; what varies with the voltage is the slope
       {0.0005, 0, 0, 0, 8, 0},                 // slope: no cause of its own
       {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
       {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
+      {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},       // blur: of R0; follows from the times at which channels are read
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},       // shapes of the OCV curve: healthy cells age differently
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
@@ -47,7 +49,9 @@ struct PackThresholds {
   double outlying_share = 0.2, outlying_cells = 4;  ///< so many cells of a pack may be faulty in one parameter
   double widest_quantile = 4, quantile_accuracy = 1e-4;  ///< of the search for a quantile of the normal distribution
   double hours_per_day = 24;
-  double instant_rows = 30;  ///< differences to the model that last longer are not steps within a row
+  std::size_t smooth_rows = 7;  ///< before and after, whose mean difference to the model is taken
+  double instant_rows = 30;     ///< differences to the model that last longer are not steps within a row
+  std::size_t blur_rows = 3;    ///< before and after: changes of the current over that time do not depend on the moment
   /// More cells than that with the same cause are no exceptions: the pack's spread is as large.
   double exceptions = 3, exceptions_share = 0.06;
   double wider = 1.5;            ///< factor on the spread then
@@ -59,9 +63,10 @@ struct PackThresholds {
   double least_sigmas = 4;       ///< size over its standard deviation
   double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
   double listed_from = 0.01;     ///< probability from which on another cause is listed
-  std::size_t most_causes = 20;  ///< of one pack
-  std::size_t checkpoints = 32;  ///< times at which the verdict is formed again
-  double separable_odds = 3;     ///< [ln] expected odds of the right cause against the other one
+  std::size_t channel_group = 4, channel_sets = 3;  ///< neighbouring cells whose channels are searched together; causes
+  std::size_t most_causes = 20;                     ///< of one pack
+  std::size_t checkpoints = 32;                     ///< times at which the verdict is formed again
+  double separable_odds = 3;                        ///< [ln] expected odds of the right cause against the other one
 
   struct Noise {
     double quiet_c = 0.01;                    ///< [C] step of the current below which second differences show the noise
@@ -71,6 +76,7 @@ struct PackThresholds {
     double ocv_axis = 0.001;   ///< error of the OCV's SOC axis between cells
     double lowest_soc = 0.04, highest_soc = 0.98;  ///< beyond, the curve of the cell file is not to be trusted:
     double beyond_axis = 0.5;                      ///< error of the axis as a share of the distance
+    double beyond_resistance = 20;                 ///< relative error of the resistances over the distance
     double track_soc = 0.006;   ///< error of the state of charge that all cells share: it matters where slopes differ
     double ocv_reach = 0.02;    ///< difference in SOC over which errors of the OCV curve become independent
     double shape_share = 0.02;  ///< error of a resistance's course, as a share of what a fault adds to it
@@ -99,6 +105,14 @@ struct PackThresholds {
     double missing_share = 0.2;             ///< of readings
     double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
   } channels;
+
+  /// Of the current sensor.
+  struct Sign {
+    std::size_t most_rows_late = 6;  ///< of the voltages
+    std::size_t least_changes = 30;  ///< of the current
+    double least_correlation = 0.3;  ///< of changes of voltage and current, against each other
+    double share_of_cells = 0.75;    ///< that must show it
+  } sign;
 
   struct Sensors {
     double healthy_k = 1.2;       ///< difference of a temperature sensor to the median, at the start
@@ -132,6 +146,12 @@ struct PackThresholds {
     double white_v = 0.0005, fast_v = 0.001, slow_v = 0.001;  ///< before the noise is learned
     int iterations = 8;
   } shared;
+
+  /// Of the residual of a fit, by the cell's state of charge.
+  struct Misfit {
+    static constexpr std::size_t bins = 20;
+    double prior_rows = 100;  ///< that have the expected noise
+  } misfit;
 
   struct Unexplained {
     double block_s = 300;    ///< over which unexplained differences are averaged

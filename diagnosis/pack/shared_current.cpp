@@ -96,6 +96,7 @@ struct Around {
   double cost = std::numeric_limits<double>::infinity();  ///< -2 log posterior but for a constant
   std::vector<double> residual_v;
   RowNoise rows;
+  Columns white;  ///< by block: the unknowns, and last the residual
 };
 
 double slope_at(const Track& t, double soc) {
@@ -152,19 +153,23 @@ Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const 
   a.with_data = of_unknowns.transpose() * columns.col(unknowns) + a.information * u;
   a.cost =
       columns.col(unknowns).squaredNorm() + whitener.log_determinant() + (u.array() / prior.array()).square().sum();
+  a.white = std::move(columns);
   return a;
 }
 
-Unknowns most_probable(const Around& a, const Unknowns& prior) {
-  Eigen::Matrix<double, unknowns, unknowns> normal = a.information;
+using Normal = Eigen::Matrix<double, unknowns, unknowns>;
+
+Normal normal_of(const Around& a, const Unknowns& prior) {
+  Normal normal = a.information;
   normal.diagonal() += prior.array().square().inverse().matrix();
-  return normal.ldlt().solve(a.with_data);
+  return normal;
 }
 
 Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
   const auto at = [&](const Unknowns& u) { return around(p, u, prior, noise); };
-  return damped_fit(at(from), &Around::u, of_shared.iterations, at,
-                    [&](const Around& fit) -> Unknowns { return most_probable(fit, prior); });
+  const auto normal = [&](const Around& fit) { return normal_of(fit, prior); };
+  const auto target = [&](const Around& fit) -> Unknowns { return normal(fit).ldlt().solve(fit.with_data); };
+  return damped_fit(at(from), &Around::u, of_shared.iterations, at, normal, target);
 }
 
 /// A coarse search over start and offset: the OCV bends, and a fit may end where another one is better.
@@ -258,11 +263,9 @@ double gain_of(const Around& a, const Unknowns& healthy, Eigen::Index unknown, d
 PackFinding finding_for(const Around& a, const Unknowns& healthy, const Hypothesis& h) {
   Unknowns prior = healthy;
   prior[h.unknown] = std::hypot(prior[h.unknown], h.fault);
-  Eigen::Matrix<double, unknowns, unknowns> normal = a.information;
-  normal.diagonal() += prior.array().square().inverse().matrix();
   Unknowns unit = Unknowns::Zero();
   unit[h.unknown] = 1;
-  const Unknowns column = normal.ldlt().solve(unit);
+  const Unknowns column = normal_of(a, prior).ldlt().solve(unit);
   PackFinding f;
   f.cause = h.cause;
   f.value = column.dot(a.with_data);
@@ -299,6 +302,31 @@ std::optional<PackFinding> judge(const Problem& p, const Around& a) {
   return f;
 }
 
+/// First time from which on the data up to it named this cause.
+std::optional<double> named_after_s(const Problem& p, const Around& all, Cause cause) {
+  std::optional<double> since;
+  const auto blocks = static_cast<Eigen::Index>(p.blocks.count()),
+             parts = static_cast<Eigen::Index>(limits.checkpoints);
+  Around a = all;
+  a.information.setZero();
+  a.with_data.setZero();
+  for (Eigen::Index part = 1, from = 0; part <= parts; ++part) {
+    const Eigen::Index to = blocks * part / parts;
+    const auto of_unknowns = all.white.block(from, 0, to - from, unknowns);
+    const Normal products = of_unknowns.transpose() * of_unknowns;
+    a.information += products;
+    a.with_data += of_unknowns.transpose() * all.white.block(from, unknowns, to - from, 1) + products * all.u;
+    from = to;
+    const std::optional<PackFinding> named = judge(p, a);
+    if (!named || named->cause != cause) {
+      since.reset();
+    } else if (!since) {
+      since = p.blocks.time_s[static_cast<std::size_t>(to - 1)] - p.pack.time_s.front();
+    }
+  }
+  return since;
+}
+
 }  // namespace
 
 SharedState shared_state_of(const Track& track, const PackRecording& pack) {
@@ -321,6 +349,7 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
   }
   noise = best.noise;
   s.finding = judge(p, best);
+  if (s.finding) s.finding->after_s = named_after_s(p, best, s.finding->cause);
   if (!s.finding) best = fit_from(p, best.u, p.healthy, noise);
   s.soc = course_of(p, best.u).soc;
   s.resistance_factor = factor_of(p, best.u, s.soc);

@@ -11,6 +11,44 @@ namespace bms::diagnosis::pack {
 
 namespace {
 
+/// Mean over the rows around each row; NaN where there is no value.
+std::vector<double> moving_mean(const std::vector<double>& values, std::size_t reach) {
+  std::vector<double> means(values.size(), no_value);
+  double sum = 0, count = 0;
+  const auto add = [&](std::size_t k, double sign) {
+    if (k >= values.size() || !std::isfinite(values[k])) return;
+    sum += sign * values[k];
+    count += sign;
+  };
+  for (std::size_t k = 0; k < reach; ++k) add(k, 1);
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    add(k + reach, 1);
+    if (k > reach) add(k - reach - 1, -1);
+    if (count > 0 && std::isfinite(values[k])) means[k] = sum / count;
+  }
+  return means;
+}
+
+/// Returns true if the current changes before or after this row.
+bool moves(const Track& track, const PackRecording& pack, std::size_t k) {
+  const double quiet_a = limits.noise.quiet_c * track.capacity_ah, now_a = pack.current_a[k];
+  const auto differs = [&](std::size_t other) { return !(std::abs(pack.current_a[other] - now_a) <= quiet_a); };
+  return (k > 0 && differs(k - 1)) || (k + 1 < pack.rows() && differs(k + 1));
+}
+
+/// Without noise where the current is constant: there, the model and the mean difference to it.
+void set_smooth(Track& track, const PackRecording& pack) {
+  std::vector<double> apart_v(pack.rows(), no_value);
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    if (!moves(track, pack, k)) apart_v[k] = track.neighbours_v[k] - track.model_v[k];
+  }
+  track.smooth_v = track.neighbours_v;
+  const std::vector<double> mean_v = moving_mean(apart_v, limits.smooth_rows);
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    if (std::isfinite(mean_v[k])) track.smooth_v[k] = track.model_v[k] + mean_v[k];
+  }
+}
+
 /// What the neighbours' voltage says of the current beyond its mean over the row: fast differences to the model only.
 void set_instant(Track& track, const PackRecording& pack) {
   track.instant_a = pack.current_a;
@@ -116,6 +154,8 @@ void set_neighbours(Track& track, const PackRecording& pack, const std::vector<s
   set_mean(track, pack, reference, by_voltmeter);
   track.mean_v = measurement::mean(track.neighbours_v);
   set_instant(track, pack);
+  set_smooth(track, pack);
+  track.slow_a = moving_mean(track.instant_a, limits.blur_rows);
 }
 
 std::vector<std::size_t> usual_cells(const PackRecording& pack) {

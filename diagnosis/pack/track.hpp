@@ -25,19 +25,24 @@ struct Track {
   std::vector<double> days;                  ///< since the start
   double mean_v = 0;                         ///< of the neighbours
   std::vector<double> neighbours_v;          ///< mean voltage of the cells that serve as the reference; NaN: unknown
+  /// The same without noise where the current is constant. What a cell differs from contains the noise of the
+  /// neighbours; a column that contained it as well would be correlated with the data.
+  std::vector<double> smooth_v;
   /// Current at the moment of sampling: the measured one is a mean over the row. Steps within a row are taken from the
   /// neighbours' voltage.
   std::vector<double> instant_a;
+  std::vector<double> slow_a;  ///< its mean over some rows before and after: the same for channels that are read later
 };
 
 /// Median time between rows.
 double usual_step_s(const PackRecording& pack);
 
-/// Without neighbours_v and instant_a. factor: by row, on the resistances of the cell file; empty: 1.
+/// Without neighbours_v, smooth_v, instant_a and slow_a. factor: by row, on the resistances of the cell file; empty: 1.
 Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor = {});
 
-/// Sets neighbours_v and instant_a: the mean of these cells. Rows in which less than half of them have a reading have
-/// no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells; for held channels.
+/// Sets neighbours_v, smooth_v, instant_a and slow_a: the mean of these cells. Rows in which less than half of them
+/// have a reading have no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells; for
+/// held channels.
 void set_neighbours(Track& track, const PackRecording& pack, const std::vector<std::size_t>& reference,
                     bool by_voltmeter);
 

@@ -1,0 +1,93 @@
+// Parts of the diagnosis of a pack: which accusations are chosen, and the sign of the current sensor.
+#include <cmath>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "diagnosis/pack/current_sign.hpp"
+#include "diagnosis/pack/selection.hpp"
+#include "plant/random.hpp"
+
+namespace bms {
+namespace {
+
+namespace dp = diagnosis::pack;
+
+constexpr double r0_ohm = 0.01, cell_v = 3.3;
+
+/// Cells whose channels show these constant errors [V] and nothing else.
+std::vector<dp::CellFit> cells_with_errors(const std::vector<double>& error_v) {
+  constexpr double sigma_v = 0.0003;
+  dp::Vector column = dp::Vector::Zero();
+  column[dp::offset] = 1 / sigma_v;
+  column[dp::gain] = cell_v / sigma_v;
+  std::vector<dp::CellFit> fits(error_v.size());
+  for (std::size_t c = 0; c < fits.size(); ++c) {
+    dp::Information information;
+    information.of_parameters = column * column.transpose();
+    information.with_data = column * error_v[c] / sigma_v;
+    fits[c].until = {information};
+  }
+  return fits;
+}
+
+TEST(PackSelection, FindsAWireNextToAnErrorOfTheNextChannel) {
+  const std::vector<dp::CellFit> fits = cells_with_errors({0, 0.0005, 0, -0.015, 0.015, -0.031, 0, -0.0005, 0, 0});
+  const dp::PackLikelihood likelihood(fits, dp::least_spread(r0_ohm), r0_ohm, 1, 1);
+  const std::vector<dp::Accusation> chosen = dp::select(likelihood, {});
+  ASSERT_EQ(chosen.size(), 2);
+  std::size_t wires = 0;
+  for (const dp::Accusation& a : chosen) {
+    if (a.cause != dp::Cause::sense_wire) {
+      EXPECT_EQ(a.cell, 5);
+      continue;
+    }
+    EXPECT_EQ(a.cell, 3);
+    ++wires;
+  }
+  EXPECT_EQ(wires, 1);
+}
+
+/// Voltages that follow the current after some rows.
+struct Load {
+  std::vector<double> current_a;
+  std::vector<std::vector<double>> voltage_v;
+};
+
+Load load_with(std::size_t late) {
+  plant::Random random(5);
+  Load load;
+  double current_a = 0;
+  for (std::size_t k = 0; k < 2'000; ++k) {
+    if (k % 7 == 0) current_a = 20 * random.normal();
+    load.current_a.push_back(current_a);
+  }
+  for (std::size_t c = 0; c < 8; ++c) {
+    std::vector<double> v;
+    for (std::size_t k = 0; k < load.current_a.size(); ++k)
+      v.push_back(cell_v + r0_ohm * load.current_a[k > late ? k - late : 0] + 0.001 * random.normal());
+    load.voltage_v.push_back(std::move(v));
+  }
+  return load;
+}
+
+TEST(PackCurrent, RecognisesAReversedSignAlsoOfLateChannels) {
+  for (const std::size_t late : {0U, 1U, 3U}) {
+    Load load = load_with(late);
+    EXPECT_FALSE(dp::reversed_current(load.current_a, load.voltage_v, 1)) << late;
+    for (double& a : load.current_a) a = -a;
+    const auto found = dp::reversed_current(load.current_a, load.voltage_v, 1);
+    ASSERT_TRUE(found) << late;
+    EXPECT_EQ(found->cause, dp::Cause::current_sign);
+    EXPECT_GT(found->value, 0.9);
+  }
+}
+
+TEST(PackCurrent, SaysNothingOfASignWithoutChangesOfTheCurrent) {
+  Load load = load_with(0);
+  for (double& a : load.current_a) a = -10;
+  EXPECT_FALSE(dp::reversed_current(load.current_a, load.voltage_v, 1));
+}
+
+}  // namespace
+}  // namespace bms
