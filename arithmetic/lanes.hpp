@@ -194,12 +194,12 @@ constexpr bool long_step(const Fraction<S>& x) { return any(x > S(0.25F)); }
 template <class S>
 requires ManyNumbers<S>
 constexpr Fraction<S> step_response(const Exponent<S>& x) {
-  constexpr int most_halvings = 7;  // 32 / 2^7 = 1/4
+  constexpr std::size_t most_halvings = 7;  // 32 / 2^7 = 1/4
   const S one(1.0F), quarter(0.25F), half(0.5F);
   const auto infinite = x > S(32.0F);
   S halved = select(infinite, one, x);
   std::array<S, most_halvings + 1> of;
-  int halvings = 0;
+  std::size_t halvings = 0;
   for (of[0] = halved; halvings < most_halvings && any(halved > quarter); of[++halvings] = halved)
     halved = halved * half;
   S result = step_response_short<S>(halved);

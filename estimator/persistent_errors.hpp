@@ -38,6 +38,8 @@ class PersistentErrorsInSigma {
   static constexpr std::size_t values = 0;  ///< that an estimate reports
   /// Time over which an unknown influence of the temperature on the resistances lasts: that of the weather.
   static constexpr double temperature_lasts_s = 36'000;
+  /// Time in which a polarisation relaxes whose time constant is not known.
+  static constexpr double relaxation_lasts_s = 1'800;
   /// Which square of the overpotential of the last half hour an unknown temperature makes uncertain: the time constants
   /// are unknown as well, so a load and its return do not cancel.
   static constexpr const Variance& past_load_v2(const Variance&, const Variance& mean_square_v2) {
@@ -91,7 +93,7 @@ class PersistentErrorsAsStates {
  public:
   static constexpr std::size_t values = 3;  ///< voltage error, current offset, standard deviation of the offset
   /// As long as the model's error, a state that takes up what lasts longer.
-  static constexpr double temperature_lasts_s = 0;
+  static constexpr double temperature_lasts_s = 0, relaxation_lasts_s = 0;
   static constexpr const Variance& past_load_v2(const Variance& squared_mean_v2, const Variance&) {
     return squared_mean_v2;
   }

@@ -31,8 +31,6 @@ class StepConstants {
  public:
   /// Range of TimeStep. The RC branch has settled after that.
   static constexpr std::uint32_t longest_step_us = 4'095'000'000U;
-  /// Time in which a polarisation relaxes whose time constant is not known.
-  static constexpr double relaxation_lasts_s = 1'800;
 
   constexpr std::uint64_t step_us() const { return step_us_; }
   constexpr const arithmetic::TimeStep<S>& duration_s() const { return duration_s_; }  ///< longest_step_us at most
@@ -42,7 +40,7 @@ class StepConstants {
   constexpr const Coupling& resistance_error() const { return resistance_error_; }
   /// Variance of R0 + R1, relative, times the number of samples over which each part of it lasts.
   constexpr const Coupling& resistance_noise() const { return resistance_noise_; }
-  /// The parts of its square: what the cell file states, and what the temperature adds.
+  /// The parts of its square: what the cell file states, and what a temperature adds that the file does not follow.
   constexpr const Coupling& known_error2() const { return known_error2_; }
   constexpr const Coupling& temperature_error2() const { return temperature_error2_; }
   /// The same as resistance_noise() for an overpotential that relaxes: what the cell file knows, and the temperature.
@@ -60,7 +58,7 @@ class StepConstants {
     duration_s_ = arithmetic::seconds<S>(capped(step_us));
     const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
     correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
-    update_resistance_noise(noise);
+    update_resistance_noise();
     bank_share_ = correlated_samples > Count(SocBank<S>::points)
                       ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
                       : Fraction(SocBank<S>::max_share);
@@ -74,18 +72,18 @@ class StepConstants {
   /// that difference (model::assumed_activation_j_per_mol).
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
-    resistance_error_ = Coupling(cell.noise.resistance_error);
+    known_error_ = Coupling(cell.noise.resistance_error);
+    Coupling unknown(0);
     if (measurement::temperature_possible(cdegc)) {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
       if (laws_of(cell).resistances_follow_temperature())
-        resistance_error_ = Coupling(resistance_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
+        known_error_ = Coupling(known_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
       else if (cdegc != cell.reference.cdegc)
-        resistance_error_ = Coupling(
-            resistance_error_ + arithmetic::magnitude(Coupling(model::mechanism_detail::arrhenius<S>(
-                                                                   cell.reference.energy_over_rt, cell.reference.c, c) -
-                                                               Factor(1))));
+        unknown = arithmetic::magnitude(Coupling(
+            model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c, c) - Factor(1)));
     }
-    update_resistance_noise(cell.noise);
+    resistance_error_ = Coupling(known_error_ + unknown);
+    update_resistance_noise();
   }
 
   /// SOC by which the charge of a step may be wrong when the current was not measured: an unknown current flowed, and
@@ -108,16 +106,17 @@ class StepConstants {
         Factor((colder ? identified.per_colder : identified.per_hotter) * arithmetic::ratio<Fraction>(beyond, kelvin)));
   }
 
-  constexpr void update_resistance_noise(const model::FilterNoise<S>& noise) {
-    const Coupling known(noise.resistance_error);
-    known_error2_ = Coupling(known * known);
+  constexpr void update_resistance_noise() {
+    known_error2_ = Coupling(known_error_ * known_error_);
     known_noise_ = arithmetic::product<Coupling>(known_error2_, correlated_samples_);
     // both have one sign for all loads, so standard deviations add: (k + t)^2 - k^2 is what t adds
-    temperature_error2_ = Coupling(Coupling(resistance_error_ - known) * Coupling(resistance_error_ + known));
-    resistance_noise_ =
-        Coupling(known_noise_ +
-                 arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(Errors::temperature_lasts_s))));
-    relaxing_noise_ = arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(relaxation_lasts_s)));
+    temperature_error2_ =
+        Coupling(Coupling(resistance_error_ - known_error_) * Coupling(resistance_error_ + known_error_));
+    const Coupling by_temperature =
+        arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(Errors::temperature_lasts_s)));
+    resistance_noise_ = Coupling(known_noise_ + by_temperature);
+    relaxing_noise_ =
+        arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(Errors::relaxation_lasts_s)));
   }
 
   /// Samples in a time, or in the correlation time of the model's error if that is longer.
@@ -142,7 +141,7 @@ class StepConstants {
   Coupling resistance_error_{}, resistance_noise_{};
   Fraction bank_share_{};
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
-  Coupling known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
+  Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };
 
 }  // namespace bms::estimator

@@ -20,7 +20,7 @@ struct Sensor {
   const char* name;
   bool cell, joint;  ///< sees the cell; sees the connection
 };
-constexpr std::array sensors = {
+constexpr std::array added_sensors = {
     Sensor{"a second voltmeter on the cell, with wires of its own, that includes the connection", true, true},
     Sensor{"a voltmeter on the poles of the cell itself, without the connection", true, false},
     Sensor{"a voltmeter over the connection alone", false, true},
@@ -102,7 +102,7 @@ Isolability isolability_of(const Matrix& information, const Vector& healthy, dou
   result.causes.assign(cell_causes.begin(), cell_causes.end());
   result.separable = separable(data_of(information, healthy, nullptr), r0_ohm);
   const std::size_t now = pairs_in(result.separable);
-  for (const Sensor& sensor : sensors) {
+  for (const Sensor& sensor : added_sensors) {
     const std::size_t then = pairs_in(separable(data_of(information, healthy, &sensor), r0_ohm));
     result.added.push_back({sensor.name, then > now ? then - now : 0});
   }
