@@ -138,8 +138,7 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
   }
   std::string text =
       "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | of these, not separable by the matrix "
-      "| "
-      "another cause for this cell | missed | right, size within 2 sigma | median time to name |\n"
+      "| another cause for this cell | missed | right, size within 2 sigma | median time to name |\n"
       "|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [id, count] : by_cause) text += row_of("`" + id + "`", count);
   text += row_of("**physics and sensors**", all) + row_of("**faults of the data**", data);

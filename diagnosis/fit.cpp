@@ -262,9 +262,7 @@ void GaussNewton::finish() {
 
 std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::linearised(const Hypothesis& h,
                                                                                   const Eigen::VectorXd& u) const {
-  Columns columns = raw_calibration_derivatives(h, u);
-  whiten(columns);
-  return factorised({h, u}, std::move(columns));
+  return factorised({h, u}, calibration_derivatives(h, u));
 }
 
 std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::factorised(Point at, Columns columns) const {
