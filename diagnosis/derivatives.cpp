@@ -1,12 +1,7 @@
 // Derivatives of the predicted voltage: dual numbers through the simulation.
-//
-// g++ calls a function for each operation of Eigen on a dual number's few derivatives unless a macro asks for inlining:
-// a third of the time of a diagnosis. -O3 makes it slower still.
-#define EIGEN_STRONG_INLINE inline __attribute__((always_inline))
 #include <algorithm>
 
-#include <ceres/jet.h>
-
+#include "arithmetic/dual_number.hpp"
 #include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/simulation_run.hpp"
 
@@ -15,9 +10,8 @@ namespace bms::diagnosis {
 namespace {
 
 /// Derivatives that go through the simulation at once.
-enum : std::size_t { least_lanes = 2, few_lanes = 4, many_lanes = 8, most_lanes = 12 };
-/// An even number: two doubles fit one register.
-constexpr std::size_t even(std::size_t lanes) { return lanes + lanes % 2; }
+enum : std::size_t { few_lanes = 4, many_lanes = 8, most_lanes = 12 };
+using arithmetic::whole_registers;
 
 /// The base parameters for derivatives along one row: a lane per lever, then one per state as it was before the row.
 template <class S>
@@ -31,16 +25,13 @@ struct OnLevers : AtUnknowns<S> {
     this->calibration.adjust(at, soc, this->u, [](std::size_t lever, const S& x) { return pulled(x, lever); });
   }
   void before_row(model::OpenLoopSimulation<S>& simulation) const {
-    Eigen::Index lane = Lever::count;
-    simulation.each_state([&](S& state) {
-      state.v.setZero();
-      state.v[lane++] = 1;
-    });
+    std::size_t lane = Lever::count;
+    simulation.each_state([&](S& state) { state = S(state.a, lane++); });
   }
 
  private:
   static S pulled(S s, std::size_t lever) {
-    s.v[static_cast<Eigen::Index>(lever)] += 1;
+    s.v.set(lever, s.v[lever] + 1);
     return s;
   }
 };
@@ -50,7 +41,7 @@ template <class S>
 struct FromBranch : AtUnknowns<S> {
   S branch_shift(std::size_t record) const {
     S shift = AtUnknowns<S>::branch_shift(record);
-    shift.v[0] += 1;
+    shift.v.set(0, shift.v[0] + 1);
     return shift;
   }
 };
@@ -70,7 +61,8 @@ std::vector<model::MechanismValues<Jet>> dual_values(const Hypothesis& h) {
 
 /// An unknown that acts on a row, through a lever.
 struct Pull {
-  Eigen::Index lever, unknown;
+  std::size_t lever;
+  Eigen::Index unknown;
   double size;
 };
 
@@ -111,9 +103,9 @@ class CarriedStates {
   template <class Row>
   void through_states(const Jet& of, Row to) const {
     to.setZero();
-    constexpr Eigen::Index first = Lever::count;
-    for (Eigen::Index s = 0; s + first < of.v.size(); ++s) {
-      if (const double by = of.v[s + first]; by != 0) to += by * states_.row(s);  // most are 0
+    for (Eigen::Index s = 0; s < states_.rows(); ++s) {
+      if (const double by = of.v[Lever::count + static_cast<std::size_t>(s)]; by != 0)
+        to += by * states_.row(s);  // most are 0
     }
   }
 
@@ -124,15 +116,14 @@ class CarriedStates {
 template <std::size_t Lanes>
 void LikelihoodModel::derive(const Hypothesis& h, const Eigen::VectorXd& u, std::span<const ParameterRef> by,
                              std::size_t first, std::size_t here, Columns& columns) const {
-  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  using Jet = arithmetic::DualNumber<Lanes>;
   std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
   const std::vector<double> unknowns(u.data(), u.data() + u.size());
   for (std::size_t lane = 0; lane < here; ++lane)
-    values[by[first + lane].setting][by[first + lane].parameter].v[static_cast<Eigen::Index>(lane)] = 1;
+    values[by[first + lane].setting][by[first + lane].parameter].v.set(lane, 1);
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   const auto put = [&](Eigen::Index at, const Jet& v) {
-    for (std::size_t lane = 0; lane < here; ++lane)
-      columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[static_cast<Eigen::Index>(lane)];
+    for (std::size_t lane = 0; lane < here; ++lane) columns(at, static_cast<Eigen::Index>(first + lane)) = v.v[lane];
   };
   for (std::size_t r = 0; r < records_.size(); ++r) {
     run<Jet>(
@@ -148,9 +139,7 @@ Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd&
   if (by.empty()) return columns;
   for (std::size_t first = 0; first < by.size();) {
     const std::size_t left = by.size() - first, here = left <= most_lanes ? left : many_lanes;
-    if (here <= least_lanes)
-      derive<least_lanes>(h, u, by, first, here, columns);
-    else if (here <= few_lanes)
+    if (here <= few_lanes)
       derive<few_lanes>(h, u, by, first, here, columns);
     else if (here <= many_lanes)
       derive<many_lanes>(h, u, by, first, here, columns);
@@ -164,7 +153,7 @@ Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd&
 
 template <std::size_t Lanes>
 void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const {
-  using Jet = ceres::Jet<double, static_cast<int>(Lanes)>;
+  using Jet = arithmetic::DualNumber<Lanes>;
   const std::vector<model::MechanismValues<Jet>> values = dual_values<Jet>(h);
   const std::vector<double> unknowns(u.data(), u.data() + u.size());
   const OnLevers<Jet> base{{calibration_, unknowns}};
@@ -172,7 +161,7 @@ void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Colum
   const auto pull = [&](std::size_t record, double time_s, double soc) {
     pulls.clear();
     calibration_.each_lever(record, time_s, soc, [&](std::size_t lever, std::size_t unknown, double size) {
-      pulls.push_back({static_cast<Eigen::Index>(lever), static_cast<Eigen::Index>(unknown), size});
+      pulls.push_back({lever, static_cast<Eigen::Index>(unknown), size});
     });
   };
   CarriedStates<Jet> states(static_cast<Eigen::Index>(Lanes - Lever::count), columns.cols(),
@@ -215,8 +204,8 @@ Columns LikelihoodModel::raw_calibration_derivatives(const Hypothesis& h, const 
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(calibration_.size()));
   std::size_t states = 0;
   for (const MechanismSetting& s : h.settings) states += model::catalogue[s.index].states;
-  constexpr std::size_t two_states = even(Lever::count + model::OneRc<double>::states + 2),
-                        all_laws = even(Lever::count + model::OpenLoopSimulation<double>::most_states);
+  constexpr std::size_t two_states = whole_registers(Lever::count + model::OneRc<double>::states + 2),
+                        all_laws = whole_registers(Lever::count + model::OpenLoopSimulation<double>::most_states);
   if (states <= two_states - Lever::count - model::OneRc<double>::states)
     carry<two_states>(h, u, columns);
   else

@@ -5,6 +5,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "arithmetic/vector_width.hpp"
 #include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/mechanisms/all.hpp"
 #include "model/corrected_readings.hpp"
@@ -60,12 +61,14 @@ void LikelihoodModel::run(const std::vector<model::MechanismValues<S>>& values, 
                                              setup.temperature_lag_s);
   model::OpenLoopSimulation<S> simulation(tables_, cell_.capacity_ah, setup.laws, setup.initial_soc);
   const auto adjust = [&](model::TablePoint<S>& at, const S& soc) { base.adjust(at, soc); };
-  for (std::size_t k = 0; k < r.size(); ++k) {
-    const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
-    const S read_a = readings.current(k) - base.offset_a(record, r.time_s[k]);
-    base.before_row(simulation);
-    row(k, simulation.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), simulation);
-  }
+  arithmetic::in_widest_vectors([&] {
+    for (std::size_t k = 0; k < r.size(); ++k) {
+      const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
+      const S read_a = readings.current(k) - base.offset_a(record, r.time_s[k]);
+      base.before_row(simulation);
+      row(k, simulation.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), simulation);
+    }
+  });
   for (std::size_t j = 0; j < r.checks.size(); ++j) {
     const Check& c = r.checks[j];
     // of a current what would flow, of a voltage what would be read behind the contacts

@@ -73,12 +73,10 @@ class CorrectedReadings {
   }
   /// Returns true if there is a fault to undo, or a derivative to compute.
   static bool acts(const S& s) {
-    if constexpr (!Dual<S>)
-      return s != 0;
-    else if constexpr (requires { s.v.isZero(0.0); })
-      return s.a != 0 || !s.v.isZero(0.0);
+    if constexpr (Dual<S>)
+      return s.a != 0 || s.v != S(0).v;
     else
-      return true;
+      return s != 0;
   }
   static std::vector<double> known(std::span<const double> column, double at_first) {
     std::vector<double> all(column.begin(), column.end());

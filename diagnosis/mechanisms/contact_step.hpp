@@ -34,7 +34,8 @@ struct Knowledge<model::ContactStep> : DefaultKnowledge<model::ContactStep> {
     return true;
   }
   template <class S>
-  static void set_up(SimulationSetup<S>& setup, model::MechanismValues<S> value) {
+  static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
+    model::MechanismValues<S> value = with;
     if (setup.record > 0) value[contact_onset] = S(setup.recording.time_s.front());
     setup.template choose<model::ContactStep>(value);
   }

@@ -63,7 +63,8 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
   /// A finding's `initial` is the first recording's; each other recording has a start of its own.
   template <class S>
-  static void set_up(SimulationSetup<S>& setup, model::MechanismValues<S> value) {
+  static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
+    model::MechanismValues<S> value = with;
     if (setup.record > 0 && setup.recording.initial_soc > thresholds.facts.charged_soc) {
       value[initial] = S(1);
       value[measured] = S(0);

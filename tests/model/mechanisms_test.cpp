@@ -3,9 +3,13 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <random>
 
+#include "arithmetic/dual_number.hpp"
+#include "arithmetic/vector_width.hpp"
 #include "model/extended_rc.hpp"
 #include "tests/cells.hpp"
 #include "tests/model/usual_mechanisms.hpp"
@@ -167,6 +171,46 @@ std::vector<S> course(std::size_t index, const MechanismValues<S>& values, const
   for (const Row& row : rows)
     v.push_back(c.step(row.time_s, row.duration_s, S(row.current_a), S(row.temperature_c), [](auto&, const auto&) {}));
   return v;
+}
+
+/// course() with each parameter an unknown.
+template <class S>
+std::vector<S> course_with_derivatives(std::size_t index, const MechanismValues<>& at, const std::vector<Row>& rows) {
+  MechanismValues<S> values;
+  for (std::size_t p = 0; p < at.size(); ++p) {
+    values[p] = S(at[p]);
+    if constexpr (requires { values[p].v.set(p, 1); })
+      values[p].v.set(p, 1);
+    else
+      values[p].v[static_cast<int>(p)] = 1;
+  }
+  return course<S>(index, values, rows);
+}
+
+TEST_P(EveryMechanism, ADualNumberHasTheBitsOfAJetInVectorsOfAnyWidth) {
+  using Jet = ceres::Jet<double, max_mechanism_parameters>;
+  using Number = DualNumber<whole_registers(max_mechanism_parameters)>;
+  const auto rows = input_of(600);
+  const MechanismValues<> at = usual(info().id).value;
+  const auto jets = course_with_derivatives<Jet>(GetParam(), at, rows);
+  const auto expect_same = [&](const std::vector<Number>& numbers, const char* where) {
+    const auto bits = [](double x) { return std::bit_cast<std::uint64_t>(x); };
+    std::size_t others = 0;
+    for (std::size_t k = 0; k < jets.size(); ++k) {
+      others += bits(jets[k].a) != bits(numbers[k].a);
+      for (std::size_t p = 0; p < at.size(); ++p)
+        others += bits(jets[k].v[static_cast<int>(p)]) != bits(numbers[k].v[p]);
+    }
+    EXPECT_EQ(others, 0U) << where;
+  };
+  std::vector<Number> numbers;
+  const auto simulate = [&] { numbers = course_with_derivatives<Number>(GetParam(), at, rows); };
+  for_any_processor(simulate);
+  expect_same(numbers, "for any processor");
+  if (!has_avx2()) return;
+  numbers.clear();
+  with_avx2(simulate);
+  expect_same(numbers, "with AVX2");
 }
 
 TEST_P(EveryMechanism, DerivativesOfTheVoltageByItsParametersAreDifferenceQuotients) {
