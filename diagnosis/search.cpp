@@ -139,7 +139,7 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;
-    HypothesisFit other = likelihood_.fit(*farther, u, numerics.fit.iterations, hopeless);
+    HypothesisFit other = likelihood_.fit(farther->hypothesis, u, numerics.fit.iterations, hopeless);
     if (other.cost < best.cost) best = std::move(other);
   }
   if (knowledge_of(c.mechanism).signature == Signature::contact_change) best = refined_onset(best);
@@ -151,30 +151,37 @@ std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) co
   return {around.calibration, likelihood_.unchanged()};
 }
 
-std::optional<Hypothesis> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) const {
+std::optional<Search::FarStart> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) const {
   MechanismSetting& s = h.settings.back();
   const std::vector<std::vector<double>> starts = knowledge_of(s.index).far_starts(s, likelihood_.facts());
   if (starts.empty()) return std::nullopt;
   double least = likelihood_.residual(h, u).squaredNorm();
-  std::optional<Hypothesis> best;
+  std::optional<FarStart> best;
   for (const std::vector<double>& start : starts) {
     std::copy(start.begin(), start.end(), s.value.begin());
     const double cost = likelihood_.residual(h, u).squaredNorm();
     if (cost >= least) continue;
     least = cost;
-    best = h;
+    best = {h, cost};
   }
   return best;
 }
 
-bool Search::far_better(const HypothesisFit& around, const Candidate& c) {
-  for (const Eigen::VectorXd& u : far_bases(around)) {
-    const auto far = far_start(with(around.hypothesis, c.start), u);
-    if (far && likelihood_.residual(*far, u).squaredNorm() <
-                   likelihood_.residual(around.hypothesis, u).squaredNorm() - candidate_limits.worth_a_fit)
-      return true;
-  }
-  return false;
+std::vector<char> Search::far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const {
+  const auto bases = far_bases(around);
+  std::vector<double> without(bases.size());
+  measurement::in_parallel(bases.size(), [&](std::size_t b) {
+    without[b] = likelihood_.residual(around.hypothesis, bases[b]).squaredNorm();
+  });
+  std::vector<char> better(candidates.size(), 0);
+  measurement::in_parallel(candidates.size(), [&](std::size_t k) {
+    if (candidates[k].gain >= candidate_limits.worth_a_fit) return;
+    for (std::size_t b = 0; b < bases.size() && better[k] == 0; ++b) {
+      const auto far = far_start(with(around.hypothesis, candidates[k].start), bases[b]);
+      if (far && far->cost < without[b] - candidate_limits.worth_a_fit) better[k] = 1;
+    }
+  });
+  return better;
 }
 
 HypothesisFit Search::refined_onset(HypothesisFit best) const {
@@ -210,11 +217,13 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
         noise == around.noise ? around
                               : likelihood_.fit(around.hypothesis, around.calibration, numerics.fit.refit_iterations);
     const Screen screen(likelihood_, from, over);
+    const std::vector<char> far = far_better(from, screen.candidates());
     std::vector<Candidate> worth;
-    for (const Candidate& c : screen.candidates()) {
+    for (std::size_t k = 0; k < far.size(); ++k) {
+      const Candidate& c = screen.candidates()[k];
       const bool promising = c.gain >= candidate_limits.worth_a_fit;
       if (promising && worth.size() >= candidate_limits.fits) continue;
-      if (!promising && !far_better(from, c)) continue;
+      if (!promising && far[k] == 0) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
     const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());

@@ -81,13 +81,17 @@ class Search {
   void learn_totals(const std::vector<HypothesisFit>& fits);
   /// A candidate added to what is there, fitted from its estimate and from far starts. Called from several threads.
   HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
+  struct FarStart {
+    Hypothesis hypothesis;
+    double cost;  ///< |residual|^2
+  };
   /// The best of some strengths far from the signature's estimate; nothing if none is better than it.
-  std::optional<Hypothesis> far_start(Hypothesis h, const Eigen::VectorXd& u) const;
+  std::optional<FarStart> far_start(Hypothesis h, const Eigen::VectorXd& u) const;
   /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
   /// a mechanism is missing.
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;
-  /// Returns true if a far start is better where the signature, which is linear, sees nothing.
-  bool far_better(const HypothesisFit& around, const Candidate& c);
+  /// By candidate: 1 if a far start is better where the signature, which is linear, sees nothing.
+  std::vector<char> far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const;
   /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best) const;
   /// The candidates fitted, by cost; the foremost with the noise that they leave, which is smaller if much is
