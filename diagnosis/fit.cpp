@@ -126,8 +126,8 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
   fit_.residual = likelihood.residual(fit_.hypothesis, fit_.calibration);
   fit_.cost = cost_of(fit_.hypothesis, fit_.calibration, fit_.residual);
   cost_at_start_ = fit_.cost;
-  if (!likelihood.nearby_) likelihood.linearise(likelihood.base(), likelihood.unchanged());
-  around_ = likelihood.nearby_;
+  if (!likelihood.has_linearisation()) likelihood.linearise(likelihood.base(), likelihood.unchanged());
+  around_ = likelihood.nearby_.get();
 }
 
 /// Derivatives by theta, as long as the fit stands where they were taken.
@@ -278,18 +278,21 @@ std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::factorise
 std::shared_ptr<const LikelihoodModel::Linearisation> LikelihoodModel::linearised_at(const Hypothesis& h,
                                                                                      const Eigen::VectorXd& u) const {
   const Point at{h, u};
-  for (const auto& known : {nearby_, latest_}) {
+  for (const auto& known : {nearby_.get(), latest_.get()}) {
     if (known && known->at == at) return known;
   }
-  if (!(at == Point{base(), unchanged()})) return latest_ = linearised(h, u);
+  if (!(at == Point{base(), unchanged()})) return latest_.set(linearised(h, u));
   // the noise changes often, this point never
-  if (!at_base_) at_base_ = std::make_shared<const Columns>(raw_calibration_derivatives(h, u));
-  Columns columns = *at_base_;
+  auto raw = at_base_.get();
+  if (!raw) raw = at_base_.set(std::make_shared<const Columns>(raw_calibration_derivatives(h, u)));
+  Columns columns = *raw;
   whiten(columns);
-  return latest_ = factorised(at, std::move(columns));
+  return latest_.set(factorised(at, std::move(columns)));
 }
 
-void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const { nearby_ = linearised_at(h, u); }
+void LikelihoodModel::linearise(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  nearby_.set(linearised_at(h, u));
+}
 
 HypothesisFit LikelihoodModel::fit(const Hypothesis& start, int iterations) const {
   return fit(start, unchanged(), iterations);

@@ -86,8 +86,8 @@ void LikelihoodModel::set_noise(const NoiseModel& noise) {
   if (!whiteners_.empty() && noise == noise_) return;
   noise_ = noise;
   whiteners_ = whiteners_for(noise);
-  nearby_.reset();
-  latest_.reset();
+  nearby_.set(nullptr);
+  latest_.set(nullptr);
 }
 
 double LikelihoodModel::cost_of_noise(const Columns& raw, const NoiseModel& noise, const NoiseModel& nominal) const {

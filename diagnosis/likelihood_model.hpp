@@ -24,6 +24,7 @@
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/prepared_recording.hpp"
 #include "diagnosis/recording_facts.hpp"
+#include "diagnosis/remembered.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
 
@@ -93,7 +94,7 @@ class LikelihoodModel {
     Eigen::MatrixXd gram;  ///< J_u' J_u + I
     Eigen::LLT<Eigen::MatrixXd> normal;
   };
-  /// Remembers the last one: several users of the same point share it. Not for several threads at once.
+  /// Remembers the last one: several users of the same point share it, also from several threads.
   std::shared_ptr<const Linearisation> linearised_at(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// By the base parameters' unknowns: a column each.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
@@ -110,7 +111,7 @@ class LikelihoodModel {
   /// The fits that follow use the base parameters' derivatives at this point until the noise changes.
   void linearise(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Returns true if fits that begin now share one; then several may run at once.
-  bool has_linearisation() const { return nearby_ != nullptr; }
+  bool has_linearisation() const { return nearby_.get() != nullptr; }
   HypothesisFit fit(const Hypothesis& start, int iterations = numerics.fit.iterations) const;
   /// From given base parameters, e.g. those of another fit. Ends early when even a step that gains all it promises
   /// leaves the cost above `hopeless`.
@@ -163,9 +164,9 @@ class LikelihoodModel {
   std::vector<std::vector<char>> usable_;  ///< by record and row
   std::vector<RowNoise> row_noise_;        ///< by record
   std::size_t samples_ = 0, checks_ = 0;
-  mutable std::shared_ptr<const Linearisation> nearby_;  ///< where fits begin to be linear in the base parameters
-  mutable std::shared_ptr<const Linearisation> latest_;  ///< that linearised_at() has made
-  mutable std::shared_ptr<const Columns> at_base_;       ///< of the cell as its file describes it; not white
+  mutable Remembered<Linearisation> nearby_;  ///< where fits begin to be linear in the base parameters
+  mutable Remembered<Linearisation> latest_;  ///< that linearised_at() has made
+  mutable Remembered<Columns> at_base_;       ///< of the cell as its file describes it; not white
 };
 
 }  // namespace bms::diagnosis

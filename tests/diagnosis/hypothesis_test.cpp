@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/bursts.hpp"
+#include "measurement/in_parallel.hpp"
 #include "model/corrected_readings.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
@@ -165,6 +166,47 @@ TEST(Hypothesis, BaseParameterDerivativesEqualFiniteDifferences) {
     const Eigen::VectorXd difference = (likelihood.residual(h, less) - likelihood.residual(h, more)) / 2e-5;
     EXPECT_LT((difference - exact.col(k)).norm(), 0.02 * exact.col(k).norm() + 1e-3) << k;
   }
+}
+
+/// The cell file's own point, and one with a mechanism.
+std::vector<LikelihoodModel::Point> two_points(const LikelihoodModel& likelihood) {
+  return {{likelihood.base(), likelihood.unchanged()},
+          {acting(likelihood, model::mechanism_index("resistance_growth")), likelihood.unchanged().array() + 0.2}};
+}
+
+TEST(Hypothesis, ASharedLinearisationIsDroppedWhenTheNoiseChanges) {
+  NoiseModel larger;
+  larger.white_v *= 3;
+  larger.slow_v *= 2;
+  for (const bool base_first : {false, true}) {
+    LikelihoodModel likelihood = plant_likelihood();
+    std::vector<LikelihoodModel::Point> points = two_points(likelihood);
+    if (!base_first) std::swap(points[0], points[1]);
+    likelihood.linearise(points[0].hypothesis, points[0].unknowns);
+    likelihood.linearised_at(points[1].hypothesis, points[1].unknowns);
+    likelihood.set_noise(larger);
+    EXPECT_FALSE(likelihood.has_linearisation());
+    const LikelihoodModel fresh(likelihood.cell(), {}, likelihood.records(), larger);
+    for (const std::size_t latest_first : {1U, 0U}) {  // a question for another point would replace it
+      const auto& [h, u] = points[latest_first];
+      EXPECT_TRUE(likelihood.linearised_at(h, u)->columns == fresh.calibration_derivatives(h, u));
+    }
+  }
+}
+
+TEST(Hypothesis, SeveralThreadsShareLinearisations) {
+  const LikelihoodModel likelihood = plant_likelihood();
+  const std::vector<LikelihoodModel::Point> points = two_points(likelihood);
+  std::vector<Columns> expected;
+  for (const auto& [h, u] : points) expected.push_back(likelihood.calibration_derivatives(h, u));
+  std::vector<char> same(100, 0);
+  measurement::in_parallel(same.size(), [&](std::size_t k) {
+    const std::size_t at = k % 3 == 0 ? 0 : 1;
+    const auto& [h, u] = points[at];
+    if (k % 10 == 0) likelihood.linearise(h, u);
+    same[k] = likelihood.linearised_at(h, u)->columns == expected[at] ? 1 : 0;
+  });
+  EXPECT_THAT(same, testing::Each(1));
 }
 
 TEST(Hypothesis, AFitIsNeverWorseThanWhereItBegan) {
