@@ -106,6 +106,20 @@ struct PackThresholds {
     double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
   } channels;
 
+  /// When channels are read, from steps of the current that stand alone.
+  struct SamplingTimes {
+    double step_c = 0.1;           ///< [C] of the current, at least
+    double quiet_share = 0.05;     ///< of the step: changes of the current in the two rows before and after
+    double beginning = 0.02;       ///< of the step in the mean of its row, so that it is not a step of the next one
+    double uneven = 0.1;           ///< of the times between rows
+    std::size_t least_steps = 50;  ///< that stand alone
+    double least_share = 0.5;      ///< their squares over those of all changes from row to row
+    double least_seen = 0.1, most_seen = 0.97;  ///< of the steps, by the usual channel
+    std::size_t parts = 20;                     ///< of the jackknife
+    double rows_after = 1.5;                    ///< from a step to the row after its own, on average
+    double unknown = 0.5;                       ///< relative error if the steps do not stand alone
+  } sampling_times;
+
   /// Of the current sensor.
   struct Sign {
     std::size_t most_rows_late = 6;  ///< of the voltages
