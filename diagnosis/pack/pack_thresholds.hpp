@@ -19,28 +19,28 @@ struct Spread {
   double most;       ///< spread that a pack may show, over `healthy`
   double scale;      ///< relative error of a size: what all cells share is not known better
   double aged = 0;   ///< in a cell with a higher resistance: R0 and R1 do not grow alike; a joint changes neither
-  double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve do not cancel
+  double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve and resistances do not cancel
   double late = 0;   ///< in a cell whose channel is late: what happened within the row is not known
 };
 
 struct PackThresholds {
   /// By parameter. Resistances of a joint are relative to R0 of the cell file at half charge.
   std::array<Spread, parameter_count> spread = {{
-      {0.004, 0.06, 0.015, 0.04, 6, 0.05},     // charge: a balanced pack is good to 1 %
-      {0.010, 0.15, 0.04, 0.12, 6, 0.1},       // capacity: cells of a batch differ by 1 %
-      {0.0005, 0.03, 0.003, 0.02, 6, 0.1},     // leak: 1 % a month is healthy
-      {0.03, 0.5, 0.12, 0.3, 4, 0.05},         // resistance
-      {0.05, 0, 0, 0, 4, 0, 0.15},             // polarisation: no cause of its own
-      {0.05, 0, 0, 0, 4, 0, 0.3},              // time constant
-      {0.02, 0, 0, 0, 6, 0, 0.15},             // tilt
-      {0.02, 0.5, 0.12, 0.3, 5, 0.05},         // joint
-      {0.001, 0.03, 0.004, 0.010, 12, 0.02},   // offset: what a monitor's datasheet states
-      {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},  // gain: as stated; what varies with the voltage is the slope
-      {0.0005, 0, 0, 0, 8, 0},                 // slope: no cause of its own
-      {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
-      {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
-      {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},       // blur: of R0; follows from the times at which channels are read
-      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},       // shapes of the OCV curve: healthy cells age differently
+      {0.004, 0.06, 0.015, 0.04, 6, 0.05},      // charge: a balanced pack is good to 1 %
+      {0.010, 0.15, 0.04, 0.12, 6, 0.1},        // capacity: cells of a batch differ by 1 %
+      {0.0005, 0.03, 0.003, 0.02, 6, 0.1},      // leak: 1 % a month is healthy
+      {0.03, 0.5, 0.12, 0.3, 4, 0.05, 0, 0.1},  // resistance
+      {0.05, 0, 0, 0, 4, 0, 0.15, 0.1},         // polarisation: no cause of its own
+      {0.05, 0, 0, 0, 4, 0, 0.3, 0.1},          // time constant
+      {0.02, 0, 0, 0, 6, 0, 0.15, 0.15},        // tilt
+      {0.02, 0.5, 0.12, 0.3, 5, 0.05},          // joint
+      {0.001, 0.03, 0.004, 0.010, 12, 0.02},    // offset: what a monitor's datasheet states
+      {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},   // gain: as stated; what varies with the voltage is the slope
+      {0.0005, 0, 0, 0, 8, 0},                  // slope: no cause of its own
+      {0.01, 3, 0.1, 1, 1e6, 0.05},             // delay: channels may be read one after the other
+      {0.02, 0, 0, 0, 3, 0},                    // temperature: 2 to 4 % per kelvin
+      {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},        // blur: of R0; follows from the times at which channels are read
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},        // shapes of the OCV curve: healthy cells age differently
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},

@@ -18,11 +18,12 @@ namespace dp = diagnosis::pack;
 constexpr double r0_ohm = 0.01, noise_v = 0.001;
 constexpr std::size_t rows = 3'000, cells = 6;
 
-/// A cell of one resistance. Its OCV is a straight line.
-model::CellParameters<> straight_cell() {
+/// A cell of one resistance. Its OCV is a straight line. course: of the resistance from empty to full, as a share of
+/// it.
+model::CellParameters<> straight_cell(double course) {
   model::CellParameters<> cell = tests::table9;
   for (std::size_t k = 0; k < cell.rc.r0_ohm.size; ++k) {
-    cell.rc.r0_ohm[k] = r0_ohm;
+    cell.rc.r0_ohm[k] = r0_ohm * (1 + course * (cell.rc.soc[k] - 0.5));
     cell.rc.r1_ohm[k] = 1e-5;
   }
   for (std::size_t k = 0; k < cell.ocv.b0_v.size; ++k) {
@@ -62,17 +63,17 @@ dp::PackRecording recording_of(double least_rows, double late) {
   return pack;
 }
 
-dp::Track track_of(const dp::PackRecording& pack) {
-  dp::Track track = dp::track_of(straight_cell(), pack, std::vector<double>(rows, 1.0));
+dp::Track track_of(const dp::PackRecording& pack, double course = 0) {
+  dp::Track track = dp::track_of(straight_cell(course), pack, std::vector<double>(rows, 1.0));
   dp::set_neighbours(track, pack, {0, 1, 2}, false);
   return track;
 }
 
 /// The last cell against the first half of the others.
-dp::CellFit fit_of(const dp::PackRecording& pack) {
-  const dp::Track track = track_of(pack);
+dp::CellFit fit_of(const dp::PackRecording& pack, dp::Parameter fault = dp::joint, double course = 0) {
+  const dp::Track track = track_of(pack, course);
   dp::Vector prior = dp::least_spread(r0_ohm);
-  prior[dp::joint] = dp::fault_spread(r0_ohm)[dp::joint];
+  prior[fault] = dp::fault_spread(r0_ohm)[fault];
   prior[dp::blur] = 1;
   prior[dp::resistance] = 1e-6;  // without polarisation it is the same as a joint
   prior[dp::delay] = 1e-6;       // the neighbours have no common moment that a delay could be measured from
@@ -122,6 +123,14 @@ TEST(PackCellFit, RowsCountLessWhereTheModelIsInexact) {
   const double inexact = information_of();
   EXPECT_LT(inexact, 0.7 * exact);
   EXPECT_GT(inexact, 0.4 * exact) << "the other half is exact";
+}
+
+TEST(PackCellFit, AWrongCourseOfTheResistancesDoesNotChangeTheChargeOfACell) {
+  dp::PackRecording pack = recording_of(20, 0);
+  constexpr double less = 0.05;
+  for (double& v : pack.cell_v.back()) v -= 0.5 * less;
+  EXPECT_NEAR(fit_of(pack, dp::charge, 0).theta[dp::charge], -less, 0.003);
+  EXPECT_NEAR(fit_of(pack, dp::charge, 1).theta[dp::charge], -less, 0.003);
 }
 
 }  // namespace
