@@ -115,8 +115,7 @@ class CellRun {
     double stored = current_a;
     if (effects_.charge_loss.share != 0 && current_a > 0)
       stored *= 1 - effects_.charge_loss.share * (0.6 + 0.8 * current_a / (current_a + effects_.charge_loss.half_a));
-    if (effects_.leak.at_3v3_a != 0)
-      stored -= effects_.leak.at_3v3_a * std::exp((std::min(voltage_v_, 3.6) - 3.3) / effects_.leak.per_e_v);
+    if (effects_.leak.at_3v3_a != 0) stored -= effects_.leak.at_3v3_a * growth_of(effects_.leak, voltage_v_);
     return stored;
   }
 
@@ -225,6 +224,10 @@ class CellRun {
 };
 
 }  // namespace
+
+double growth_of(const Leak& leak, double voltage_v) {
+  return std::exp((std::min(voltage_v, 3.6) - 3.3) / leak.per_e_v);
+}
 
 CellTrace run_cell(const HealthyCell& cell, const CellEffects& effects, const Stimulus& stimulus, double start_soc) {
   if (effects.parallel.inequality != 0) return run_parallel_cells(cell, effects.parallel, stimulus, start_soc);

@@ -103,6 +103,9 @@ struct Leak {
   double per_e_v = 0.12;  ///< voltage [V] over which the current grows e-fold
 };
 
+/// The current of a leak at this voltage over that at 3.3 V.
+double growth_of(const Leak& leak, double voltage_v);
+
 /// The fraction share (0.6 + 0.8 I / (I + half_a)) of the charging current is not stored.
 struct ChargeLoss {
   double share = 0;

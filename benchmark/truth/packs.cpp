@@ -108,6 +108,13 @@ World world_of(const Build& b, const std::vector<PackFault>& faults, std::size_t
   return w;
 }
 
+/// How late a channel is sampled, in fine steps.
+std::size_t steps_late(const Build& b, const std::vector<PackFault>& faults, std::size_t cell) {
+  const double place = static_cast<double>(cell) / static_cast<double>(b.setting.cells);
+  const double delay_s = b.staggered_s * place + size_of(faults, "channel_skew", cell);
+  return static_cast<std::size_t>(std::lround(delay_s / b.fine_s));
+}
+
 /// What one channel reads of a voltage: sampled late, with its own errors, held.
 std::vector<double> channel_of(const Build& b, const std::vector<PackFault>& faults, std::size_t cell,
                                const std::vector<double>& fine_v) {
@@ -116,9 +123,7 @@ std::vector<double> channel_of(const Build& b, const std::vector<PackFault>& fau
   double offset_v = b.unequal.offset_v * random.normal() + size_of(faults, "voltage_offset", cell) +
                     size_of(faults, "sense_wire", cell);
   if (cell > 0) offset_v -= size_of(faults, "sense_wire", cell - 1);
-  const double place = static_cast<double>(cell) / static_cast<double>(b.setting.cells);
-  const double delay_s = b.staggered_s * place + size_of(faults, "channel_skew", cell);
-  const auto late = static_cast<std::size_t>(std::lround(delay_s / b.fine_s));
+  const std::size_t late = steps_late(b, faults, cell);
   std::vector<double> values;
   for (std::size_t k = fine_per_row - 1; k < fine_v.size(); k += fine_per_row)
     values.push_back((1 + gain) * fine_v[k > late ? k - late : 0] + offset_v);
@@ -175,6 +180,43 @@ std::vector<double> voltmeter_of(const Build& b, const std::vector<PackFault>& f
   return read_by(plant::Channel(chain, derived_seed(b.seed, 8'000)), b.setting.step_s, sum_v);
 }
 
+/// The share of its charge that a cell has lost a day, on average over the recording: the leak depends on the voltage.
+double mean_leak(const Build& b, const World& world, const std::vector<double>& fine_v) {
+  const Leak& leak = world.cell.leak;
+  double sum_a = 0;
+  for (const double v : fine_v) sum_a += leak.at_3v3_a * growth_of(leak, v);
+  const double capacity_ah = b.cell.capacity_ah * world.cell.capacity_factor;
+  return 24 * sum_a / static_cast<double>(fine_v.size()) / capacity_ah;
+}
+
+/// Mean over the channels that have no fault of their own, except this one.
+double usual_steps_late(const Build& b, const std::vector<PackFault>& faults, std::size_t except) {
+  double sum = 0, count = 0;
+  for (std::size_t k = 0; k < b.setting.cells; ++k) {
+    const bool own = size_of(faults, "channel_skew", k) != 0 || size_of(faults, "channel_held", k) != 0;
+    if (k == except || own) continue;
+    sum += static_cast<double>(steps_late(b, faults, k));
+    ++count;
+  }
+  return sum / count;
+}
+
+/// The sizes as they can be measured: what was simulated, relative to the other cells, on average over the recording.
+std::vector<PackFault> measurable(const Build& b, std::vector<PackFault> faults, const std::vector<double>& leaks) {
+  const std::vector<PackFault> planted = faults;
+  for (PackFault& f : faults) {
+    if (f.id == "leakage") f.size = leaks[*f.cell];
+    if (f.id == "channel_skew")
+      f.size =
+          b.fine_s * (static_cast<double>(steps_late(b, planted, *f.cell)) - usual_steps_late(b, planted, *f.cell));
+  }
+  if (b.staggered_s == 0) return faults;
+  const std::size_t last = steps_late(b, {}, b.setting.cells - 1);
+  faults.push_back(
+      {.id = "channels_staggered", .cell = {}, .size = b.fine_s * static_cast<double>(last), .of_data = true});
+  return faults;
+}
+
 }  // namespace
 
 PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
@@ -187,12 +229,13 @@ PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
   c.given_initial_soc = b.start_soc + c.cell.initial_soc_tolerance * between(random, -0.6, 0.6);
   if (!healthy) c.faults = draw_pack_faults(b.setting, random);
   const std::size_t cells = b.setting.cells, sensors = b.setting.sensors;
-  std::vector<double> sum_v;
+  std::vector<double> sum_v, leaks;
   c.recording.sensor_c.resize(sensors);
   for (std::size_t k = 0; k < cells; ++k) {
     const World world = world_of(b, c.faults, k);
     const CellTrace trace = run_cell(b.cell, world.cell, world.stimulus, world.start_soc);
     c.recording.cell_v.push_back(channel_of(b, c.faults, k, trace.voltage_v));
+    leaks.push_back(mean_leak(b, world, trace.voltage_v));
     const std::vector<double> row_v = rows_of(trace.voltage_v);
     sum_v.resize(row_v.size(), 0.0);
     for (std::size_t r = 0; r < row_v.size(); ++r) sum_v[r] += row_v[r];
@@ -206,11 +249,7 @@ PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
   for (std::size_t k = 0; k < sum_v.size(); ++k)
     c.recording.time_s.push_back(static_cast<double>(k) * b.setting.step_s);
   c.hours = c.recording.time_s.back() / 3'600;
-  if (b.staggered_s > 0)
-    c.faults.push_back({.id = "channels_staggered",
-                        .cell = {},
-                        .size = b.staggered_s * static_cast<double>(cells - 1) / static_cast<double>(cells),
-                        .of_data = true});
+  c.faults = measurable(b, c.faults, leaks);
   return c;
 }
 

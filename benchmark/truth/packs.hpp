@@ -27,8 +27,9 @@ struct PackFault {
   std::string id;                   ///< as in the JSON of the diagnosis
   std::optional<std::size_t> cell;  ///< from 0; of a sense wire the lower cell; nothing: the pack. A thermistor: its
                                     ///< number
-  double size = 0;                  ///< in the unit of the diagnosis
-  bool of_data = false;             ///< late, held or staggered channels
+  double size = 0;       ///< in the unit of the diagnosis, as it can be measured: against the other cells, on
+                         ///< average over the recording
+  bool of_data = false;  ///< late, held or staggered channels
 };
 
 struct PackCase {

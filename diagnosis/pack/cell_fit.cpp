@@ -122,15 +122,15 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     const std::size_t then = late.row;  // when the channel was sampled
     const double dz = change_of_soc(t, theta, then);
     const auto from = model::look_up(t.cell, t.soc[then], here), to = model::look_up(t.cell, t.soc[then] + dz, there);
-    const double slope_v = to.ocv_delta_v * to.per_width,
-                 by_soc_v = slope_v + to.r0_delta_ohm * to.per_width * current_a;
+    // not the resistances' course over the state of charge: the cell file knows it too badly to measure a charge by it
+    const double slope_v = to.ocv_delta_v * to.per_width;
     // what the neighbours lose; measured, it is closer to the truth than tables that were not compared with the pack
     const double all_v = t.is_calibrated ? t.r0_by_row_ohm[then] * current_a + t.v_rc_v[then] : late.v - from.ocv_v;
     const double warmer_k = input.warmer_k.empty() || !std::isfinite(input.warmer_k[k]) ? 0 : input.warmer_k[k];
     auto row = out.columns.row(static_cast<Eigen::Index>(k));
-    row[charge] = by_soc_v;
-    row[capacity] = by_soc_v * (t.soc[then] - t.soc.front());
-    row[leak] = -by_soc_v * t.days[then];
+    row[charge] = slope_v;
+    row[capacity] = slope_v * (t.soc[then] - t.soc.front());
+    row[leak] = -slope_v * t.days[then];
     row[resistance] = all_v;
     row[polarisation] = t.v_rc_v[then];
     const double tau_v = (1 + theta[resistance] + theta[polarisation]) * t.v_rc_by_tau_v[then];

@@ -12,6 +12,7 @@
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/sampling_times.hpp"
 #include "diagnosis/pack/selection.hpp"
 #include "diagnosis/pack/sensors.hpp"
 #include "diagnosis/pack/shared_current.hpp"
@@ -233,12 +234,14 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
 /// Channels of the pack that are sampled at different times, against the spread that noise gives.
 std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likelihood) {
   std::vector<double> delays, sigmas;
+  std::vector<std::size_t> cells;
   for (std::size_t c = 0; c < s.fits.size(); ++c) {
     const bool accused = std::any_of(s.accused.begin(), s.accused.end(), [&](const auto& a) { return a.touches(c); });
     if (accused || s.channels.cells[c].held_s) continue;
     const Accusation a{Cause::late, c};
     const Estimated e = likelihood.size({a}, a, likelihood.last_checkpoint());
     delays.push_back(e.value);
+    cells.push_back(c);
     // without the spread itself
     sigmas.push_back(std::sqrt(std::max(0.0, e.sigma * e.sigma - s.healthy[delay] * s.healthy[delay])));
   }
@@ -246,14 +249,13 @@ std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likel
   const double sigma = measurement::median(sigmas);
   const double spread = s.healthy[delay];
   if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
-  // from the first to the last one: from those between single late channels, as if they were evenly spread
-  std::sort(delays.begin(), delays.end());
-  const std::size_t few = delays.size() / (2 * limits.unexplained.cells);
   PackFinding f;
   f.cause = Cause::staggered;
-  const double last = static_cast<double>(delays.size() - 1), used = last - 2 * static_cast<double>(few);
-  f.value = (delays[delays.size() - 1 - few] - delays[few]) * last / used;
-  f.sigma = std::hypot(sigma, sigma, limits.spread[delay].scale * f.value);
+  const double linear_s = span_of(delays);
+  const Estimated span =
+      sampling_span(s.track, s.pack, cells).value_or(Estimated{linear_s, limits.sampling_times.unknown * linear_s});
+  f.value = span.value;
+  f.sigma = std::hypot(span.sigma, sigma, limits.spread[delay].scale * f.value);
   f.gain = spread / sigma;
   f.probability = 1;
   return f;

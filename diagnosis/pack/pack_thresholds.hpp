@@ -19,28 +19,28 @@ struct Spread {
   double most;       ///< spread that a pack may show, over `healthy`
   double scale;      ///< relative error of a size: what all cells share is not known better
   double aged = 0;   ///< in a cell with a higher resistance: R0 and R1 do not grow alike; a joint changes neither
-  double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve do not cancel
+  double moved = 0;  ///< in a cell with another charge: errors of the cell file's curve and resistances do not cancel
   double late = 0;   ///< in a cell whose channel is late: what happened within the row is not known
 };
 
 struct PackThresholds {
   /// By parameter. Resistances of a joint are relative to R0 of the cell file at half charge.
   std::array<Spread, parameter_count> spread = {{
-      {0.004, 0.06, 0.015, 0.04, 6, 0.05},     // charge: a balanced pack is good to 1 %
-      {0.010, 0.15, 0.04, 0.12, 6, 0.1},       // capacity: cells of a batch differ by 1 %
-      {0.0005, 0.03, 0.003, 0.02, 6, 0.1},     // leak: 1 % a month is healthy
-      {0.03, 0.5, 0.12, 0.3, 4, 0.05},         // resistance
-      {0.05, 0, 0, 0, 4, 0, 0.15},             // polarisation: no cause of its own
-      {0.05, 0, 0, 0, 4, 0, 0.3},              // time constant
-      {0.02, 0, 0, 0, 6, 0, 0.15},             // tilt
-      {0.02, 0.5, 0.12, 0.3, 5, 0.05},         // joint
-      {0.001, 0.03, 0.004, 0.010, 12, 0.02},   // offset: what a monitor's datasheet states
-      {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},  // gain: as stated; what varies with the voltage is the slope
-      {0.0005, 0, 0, 0, 8, 0},                 // slope: no cause of its own
-      {0.01, 3, 0.1, 1, 1e6, 0.05},            // delay: channels may be read one after the other
-      {0.02, 0, 0, 0, 3, 0},                   // temperature: 2 to 4 % per kelvin
-      {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},       // blur: of R0; follows from the times at which channels are read
-      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},       // shapes of the OCV curve: healthy cells age differently
+      {0.004, 0.06, 0.015, 0.04, 6, 0.05},      // charge: a balanced pack is good to 1 %
+      {0.010, 0.15, 0.04, 0.12, 6, 0.1},        // capacity: cells of a batch differ by 1 %
+      {0.0005, 0.03, 0.003, 0.02, 6, 0.1},      // leak: 1 % a month is healthy
+      {0.03, 0.5, 0.12, 0.3, 4, 0.05, 0, 0.1},  // resistance
+      {0.05, 0, 0, 0, 4, 0, 0.15, 0.1},         // polarisation: no cause of its own
+      {0.05, 0, 0, 0, 4, 0, 0.3, 0.1},          // time constant
+      {0.02, 0, 0, 0, 6, 0, 0.15, 0.15},        // tilt
+      {0.02, 0.5, 0.12, 0.3, 5, 0.05},          // joint
+      {0.001, 0.03, 0.004, 0.010, 12, 0.02},    // offset: what a monitor's datasheet states
+      {0.0003, 0.01, 0.0015, 0.005, 1, 0.05},   // gain: as stated; what varies with the voltage is the slope
+      {0.0005, 0, 0, 0, 8, 0},                  // slope: no cause of its own
+      {0.01, 3, 0.1, 1, 1e6, 0.05},             // delay: channels may be read one after the other
+      {0.02, 0, 0, 0, 3, 0},                    // temperature: 2 to 4 % per kelvin
+      {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},        // blur: of R0; follows from the times at which channels are read
+      {0.0005, 0, 0, 0, 8, 0, 0, 0.001},        // shapes of the OCV curve: healthy cells age differently
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
@@ -105,6 +105,20 @@ struct PackThresholds {
     double missing_share = 0.2;             ///< of readings
     double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
   } channels;
+
+  /// When channels are read, from steps of the current that stand alone.
+  struct SamplingTimes {
+    double step_c = 0.1;           ///< [C] of the current, at least
+    double quiet_share = 0.05;     ///< of the step: changes of the current in the two rows before and after
+    double beginning = 0.02;       ///< of the step in the mean of its row, so that it is not a step of the next one
+    double uneven = 0.1;           ///< of the times between rows
+    std::size_t least_steps = 50;  ///< that stand alone
+    double least_share = 0.5;      ///< their squares over those of all changes from row to row
+    double least_seen = 0.1, most_seen = 0.97;  ///< of the steps, by the usual channel
+    std::size_t parts = 20;                     ///< of the jackknife
+    double rows_after = 1.5;                    ///< from a step to the row after its own, on average
+    double unknown = 0.5;                       ///< relative error if the steps do not stand alone
+  } sampling_times;
 
   /// Of the current sensor.
   struct Sign {

@@ -140,7 +140,10 @@ std::vector<Accusation> select(const PackLikelihood& likelihood, const std::vect
     return std::find(certain.begin(), certain.end(), a) != certain.end();
   };
   const auto possible = [&](const std::vector<Accusation>& others, const Accusation& a) {
-    const auto alike = [&](const Accusation& o) { return o.cell == a.cell && are_alike(o.cause, a.cause); };
+    const auto alike = [&](const Accusation& o) {
+      const bool of_one_channel = is_of_channel(o) && is_of_channel(a) && would_cancel(o, a);
+      return of_one_channel || (o.cell == a.cell && are_alike(o.cause, a.cause));
+    };
     if (std::any_of(others.begin(), others.end(), alike)) return false;
     return likelihood.is_possible(a, likelihood.size(with(others, a), a, now));
   };

@@ -1,4 +1,5 @@
 // Parts of the diagnosis of a pack: which accusations are chosen, and the sign of the current sensor.
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -46,6 +47,17 @@ TEST(PackSelection, FindsAWireNextToAnErrorOfTheNextChannel) {
     ++wires;
   }
   EXPECT_EQ(wires, 1);
+}
+
+TEST(PackSelection, AccusesNoChannelTwice) {
+  const std::vector<dp::CellFit> fits = cells_with_errors({0, 0.0005, 0, -0.015, 0.04, 0, 0, -0.0005, 0, 0});
+  const dp::PackLikelihood likelihood(fits, dp::least_spread(r0_ohm), r0_ohm, 1, 1);
+  const std::vector<dp::Accusation> chosen = dp::select(likelihood, {});
+  EXPECT_FALSE(chosen.empty());
+  for (std::size_t channel = 0; channel < fits.size(); ++channel) {
+    const auto count = std::count_if(chosen.begin(), chosen.end(), [&](const auto& a) { return a.touches(channel); });
+    EXPECT_LE(count, 1) << "channel " << channel + 1 << ": errors that cancel can have any size";
+  }
 }
 
 /// Voltages that follow the current after some rows.

@@ -1,0 +1,27 @@
+// The time from the first to the last channel of a pack that is read, from steps of the current.
+//
+// Where a step stands alone, a channel that is read d later than the end of the row has seen it in that row with the
+// probability 1 - d / T (T: length of a row), because the moment of the step within the row is random. The difference
+// to the neighbours cannot show it as well: their mean is itself a reading of several moments.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+#include "diagnosis/pack/pack_likelihood.hpp"
+#include "diagnosis/pack/pack_recording.hpp"
+#include "diagnosis/pack/track.hpp"
+
+namespace bms::diagnosis::pack {
+
+/// From the first to the last one of these delays: from those between single late channels, as if they were evenly
+/// spread.
+double span_of(std::vector<double> delays_s);
+
+/// From the first to the last one of these cells' channels [s]. Nothing if most steps of the current do not stand
+/// alone: then, what happened within a row is unknown.
+std::optional<Estimated> sampling_span(const Track& track, const PackRecording& pack,
+                                       const std::vector<std::size_t>& cells);
+
+}  // namespace bms::diagnosis::pack
