@@ -16,7 +16,8 @@ namespace {
 using Eigen::Index;
 using Eigen::VectorXd;
 
-constexpr std::size_t pieces = 10;     // as many as the OCV of the paper has
+constexpr std::size_t pieces = 10;  // as many as the OCV of the paper has
+constexpr std::size_t corners = pieces + 1;
 constexpr double rounded_part = 0.25;  // of a piece, on each side of a corner
 constexpr double soft_c_rate = 0.05;   // below it s(i) is rounded
 
@@ -33,9 +34,9 @@ double ramp_slope(double x) { return std::clamp((x + 1) / 2, 0.0, 1.0); }
 /// A rounded ramp, or its slope, from every inner corner.
 class Bends {
  public:
-  /// at: in pieces from the first of `corners` corners.
+  /// at: in pieces from the first of `count` corners.
   template <class Basis>
-  Bends(double at, std::size_t corners, const Basis& basis) : last_(corners - 1) {
+  Bends(double at, std::size_t count, const Basis& basis) : last_(count - 1) {
     for (std::size_t k = 1; k < last_; ++k) bend_[k] = basis((at - static_cast<double>(k)) / rounded_part);
   }
 
@@ -51,7 +52,7 @@ class Bends {
 
  private:
   std::size_t last_;
-  std::array<double, pieces + 1> bend_{};
+  std::array<double, corners> bend_{};
 };
 
 /// Weight of corner k in the curve.
@@ -69,7 +70,9 @@ struct Problem {
   Data data;
   HammersteinWiener start;
   VectorXd unknowns;
-  LeastSquares linear;  ///< only for its scale
+  std::size_t every = 1;
+
+  Index sample_rows() const { return static_cast<Index>((data.size() + every - 1) / every); }
 };
 
 Index linear_size(const HammersteinWiener& m) { return static_cast<Index>(m.structure.unknowns()); }
@@ -103,20 +106,21 @@ void add_samples(const Problem& p, const HammersteinWiener& m, VectorXd& r, Eige
     by_direction = simulate(forced, size);
     by_growth = simulate(forced, grown);
   }
-  const Index first = linear_size(m);
-  for (Index k = 0; k < w.size(); ++k) {
+  const Index first = linear_size(m), every = static_cast<Index>(p.every);
+  for (Index row = 0; row < p.sample_rows(); ++row) {
+    const Index k = row * every;
     const double measured_v = p.data.voltage_v[static_cast<std::size_t>(k)];
     if (!std::isfinite(measured_v)) continue;
-    r[k] = m.output.through(w[k]) - measured_v;
+    r[row] = m.output.through(w[k]) - measured_v;
     if (jacobian == nullptr) continue;
     const double slope = m.output.slope(w[k]);
-    jacobian->row(k).head(first) = slope * by_linear.row(k);
-    (*jacobian)(k, first) = slope * by_direction[k];
-    (*jacobian)(k, first + 1) = slope * by_growth[k];
+    jacobian->row(row).head(first) = slope * by_linear.row(k);
+    (*jacobian)(row, first) = slope * by_direction[k];
+    (*jacobian)(row, first + 1) = slope * by_growth[k];
     const double at = (w[k] - m.output.w_from_v) / m.output.w_step_v;
-    const Bends ramps(at, pieces + 1, ramp);
-    for (std::size_t c = 1; c < pieces; ++c)
-      (*jacobian)(k, first + 1 + static_cast<Index>(c)) = corner_weight(ramps, at, c);
+    const Bends ramps(at, corners, ramp);
+    for (std::size_t c = 0; c < corners; ++c)
+      (*jacobian)(row, first + input_unknowns + static_cast<Index>(c)) = corner_weight(ramps, at, c);
   }
 }
 
@@ -125,7 +129,7 @@ void add_priors(const Problem& p, const VectorXd& x, VectorXd& r, Eigen::MatrixX
   const Index first = linear_size(p.start);
   for (Index k = first; k < x.size(); ++k) {
     const double weight = residual_v / (k < first + input_unknowns ? input_prior : corner_prior_v);
-    const Index row = static_cast<Index>(p.data.size()) + k - first;
+    const Index row = p.sample_rows() + k - first;
     r[row] = weight * (x[k] - p.unknowns[k]);
     if (jacobian != nullptr) (*jacobian)(row, k) = weight;
   }
@@ -170,11 +174,11 @@ VectorXd simulate(const HammersteinWiener& m, std::span<const double> current_a)
 
 VectorXd to_unknowns(const HammersteinWiener& m) {
   const Index first = linear_size(m);
-  VectorXd x(first + input_unknowns + static_cast<Index>(pieces) - 1);
+  VectorXd x(first + input_unknowns + static_cast<Index>(corners));
   x.head(first) = to_unknowns(m.linear, m.structure);
   x[first] = m.input.direction;
   x[first + 1] = m.input.growth;
-  for (std::size_t c = 1; c < pieces; ++c) x[first + 1 + static_cast<Index>(c)] = m.output.y_v[c];
+  for (std::size_t c = 0; c < corners; ++c) x[first + input_unknowns + static_cast<Index>(c)] = m.output.y_v[c];
   return x;
 }
 
@@ -183,9 +187,11 @@ HammersteinWiener with_unknowns(HammersteinWiener m, const VectorXd& x) {
   m.linear = to_model(x.head(first), m.structure);
   m.input.direction = x[first];
   m.input.growth = x[first + 1];
-  for (std::size_t c = 1; c < pieces; ++c) m.output.y_v[c] = x[first + 1 + static_cast<Index>(c)];
+  for (std::size_t c = 0; c < corners; ++c) m.output.y_v[c] = x[first + input_unknowns + static_cast<Index>(c)];
   return m;
 }
+
+Index unknowns_before_corners(const HammersteinWiener& m) { return linear_size(m) + input_unknowns; }
 
 HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const Structure& structure,
                                            const model::OcvTable<double>& ocv, const Data& data, double soc,
@@ -212,7 +218,7 @@ HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const St
     return ocv.b0_v[k] + ocv.b1_v[k] * inside;
   };
   const double from_v = ocv_v(soc - half), range_v = ocv_v(soc + half) - from_v;
-  for (std::size_t k = 0; k <= pieces; ++k) {
+  for (std::size_t k = 0; k < corners; ++k) {
     const double part = static_cast<double>(k) / static_cast<double>(pieces);
     const double shape = range_v > 0 ? (ocv_v(soc - half + 2 * part * half) - from_v) / range_v : part;
     m.output.y_v.push_back(m.output.w_from_v + shape * m.output.w_step_v * static_cast<double>(pieces));
@@ -220,11 +226,12 @@ HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const St
   return m;
 }
 
-LeastSquares simulation_error(const Data& data, const HammersteinWiener& start) {
+LeastSquares simulation_error(const Data& data, const HammersteinWiener& start, std::size_t every) {
   const auto shared = std::make_shared<Problem>();
   shared->data = data;
   shared->start = start;
   shared->unknowns = to_unknowns(start);
+  shared->every = every;
   const Index first = linear_size(start);
   LeastSquares problem;
   problem.scale = VectorXd::Constant(shared->unknowns.size(), 0.01);
@@ -234,7 +241,7 @@ LeastSquares simulation_error(const Data& data, const HammersteinWiener& start) 
     if (!x.allFinite()) return false;
     const HammersteinWiener m = with_unknowns(shared->start, x);
     if (!stable(m.linear.f, 1.0 / static_cast<double>(shared->data.size()))) return false;
-    const Index rows = static_cast<Index>(shared->data.size()) + x.size() - first;
+    const Index rows = shared->sample_rows() + x.size() - first;
     r = VectorXd::Zero(rows);
     if (jacobian != nullptr) *jacobian = Eigen::MatrixXd::Zero(rows, x.size());
     add_samples(*shared, m, r, jacobian);
@@ -244,19 +251,20 @@ LeastSquares simulation_error(const Data& data, const HammersteinWiener& start) 
   return problem;
 }
 
+VectorXd residuals_of(const HammersteinWiener& model, const Data& data) {
+  VectorXd residuals = -simulate(model, data.current_a);
+  for (Index k = 0; k < residuals.size(); ++k) residuals[k] += data.voltage_v[static_cast<std::size_t>(k)];
+  return without_missing(residuals);
+}
+
 std::vector<HammersteinWiener> resampled(const HammersteinWiener& model, const Data& data, std::size_t count,
                                          std::uint64_t seed) {
-  const VectorXd simulated = simulate(model, data.current_a);
-  std::vector<double> residuals;
-  for (std::size_t k = 0; k < data.size(); ++k) {
-    if (std::isfinite(data.voltage_v[k])) residuals.push_back(data.voltage_v[k] - simulated[static_cast<Index>(k)]);
-  }
+  const VectorXd simulated = simulate(model, data.current_a), residuals = residuals_of(model, data);
   const auto n = static_cast<double>(residuals.size());
   const auto unknowns = static_cast<double>(to_unknowns(model).size());
   if (n <= unknowns) throw std::invalid_argument("fewer measured voltages than unknowns of the model");
   const double enlarged = std::sqrt(n / (n - unknowns));
-  const Eigen::Map<const VectorXd> all(residuals.data(), static_cast<Index>(residuals.size()));
-  const auto block = static_cast<std::size_t>(std::clamp(std::ceil(correlation_length(all)), 1.0, n / 4));
+  const auto block = static_cast<std::size_t>(std::clamp(std::ceil(correlation_length(residuals)), 1.0, n / 4));
   std::mt19937_64 random(seed);
   std::vector<HammersteinWiener> models;
   Stopping few;
@@ -266,8 +274,10 @@ std::vector<HammersteinWiener> resampled(const HammersteinWiener& model, const D
     std::vector<double>& v = drawn.voltage_v.edit();
     std::size_t source = 0;
     for (std::size_t k = 0; k < v.size(); ++k) {
-      if (k % block == 0) source = static_cast<std::size_t>(random() % (residuals.size() - block + 1));
-      if (std::isfinite(v[k])) v[k] = simulated[static_cast<Index>(k)] + enlarged * residuals[source + k % block];
+      if (k % block == 0)
+        source = static_cast<std::size_t>(random() % (static_cast<std::size_t>(residuals.size()) - block + 1));
+      if (!std::isfinite(v[k])) continue;
+      v[k] = simulated[static_cast<Index>(k)] + enlarged * residuals[static_cast<Index>(source + k % block)];
     }
     const Optimum found =
         minimise(simulation_error(drawn, model), to_unknowns(model), Method::trust_region_reflective, few);
@@ -291,6 +301,12 @@ Band band_of(const HammersteinWiener& model, const std::vector<HammersteinWiener
   const VectorXd variance = (squares - sum.cwiseAbs2() / count) / (count - 1);
   const VectorXd half = t * variance.cwiseMax(0).cwiseSqrt(), middle = simulate(model, current_a);
   return {middle - half, middle + half};
+}
+
+std::optional<Band> confidence_band(const HammersteinWiener& model, const Data& data, std::size_t count,
+                                    std::uint64_t seed) {
+  if (!whiteness(residuals_of(model, data)).white()) return std::nullopt;
+  return band_of(model, resampled(model, data, count, seed), data.current_a);
 }
 
 }  // namespace bms::identification

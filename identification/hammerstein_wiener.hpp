@@ -6,12 +6,13 @@
 //   y = g(w)                                                ten straight pieces with rounded corners
 //
 // g starts as the shape of the OCV over the state of charge that the data cover (section 2), stretched over the range
-// of w. Its two ends are fixed, because gain and offset are already unknowns of the linear block; nine corners are
-// unknown. Corners that the data do not reach stay where they are, by weak priors. The corners are rounded so that
-// every optimiser has derivatives.
+// of w. Its eleven corners are unknown: gain and offset of the linear block decide where they lie along w. Corners that
+// the data do not reach stay where they are, by weak priors. The corners are rounded so that every optimiser has
+// derivatives.
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -48,9 +49,11 @@ struct HammersteinWiener {
 
 Eigen::VectorXd simulate(const HammersteinWiener& model, std::span<const double> current_a);
 
-/// Unknowns: those of the linear block, direction, growth, inner corners of the output curve.
+/// Unknowns: those of the linear block, direction, growth, corners of the output curve.
 Eigen::VectorXd to_unknowns(const HammersteinWiener& model);
 HammersteinWiener with_unknowns(HammersteinWiener model, const Eigen::VectorXd& unknowns);
+/// How many unknowns come before the corners. The residuals are linear in the corners.
+Eigen::Index unknowns_before_corners(const HammersteinWiener& model);
 
 /// How many pieces the curve on the output reaches beyond the range of w over the data. It decides where its corners
 /// lie, and from there a search does not move them by a piece.
@@ -64,8 +67,8 @@ HammersteinWiener begin_hammerstein_wiener(const DiscreteModel& linear, const St
                                            const model::OcvTable<double>& ocv, const Data& data, double soc,
                                            const BeyondData& beyond = {});
 
-/// Simulation error, then the priors. Throws as simulation_error().
-LeastSquares simulation_error(const Data& data, const HammersteinWiener& start);
+/// Simulation error of every `every`-th sample, then the priors. Throws as simulation_error().
+LeastSquares simulation_error(const Data& data, const HammersteinWiener& start, std::size_t every = 1);
 
 /// Models from data with resampled residuals: the spread of what they simulate is the uncertainty of the model.
 /// Residuals are drawn in blocks as long as their correlation, and enlarged by the freedom that the fit takes. The same
@@ -79,5 +82,13 @@ struct Band {
 };
 Band band_of(const HammersteinWiener& model, const std::vector<HammersteinWiener>& resampled,
              std::span<const double> current_a);
+
+/// Measured minus simulated, without missing samples.
+Eigen::VectorXd residuals_of(const HammersteinWiener& model, const Data& data);
+
+/// The band over the data that the model was identified from. Empty where its residuals are not white noise: then the
+/// model lacks something, which no spread of resampled residuals contains, and the band would be too narrow.
+std::optional<Band> confidence_band(const HammersteinWiener& model, const Data& data, std::size_t count,
+                                    std::uint64_t seed);
 
 }  // namespace bms::identification

@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "identification/circuit_from_discrete.hpp"
+#include "identification/hammerstein_wiener_search.hpp"
 #include "identification/prefilter.hpp"
 #include "identification/resample.hpp"
 
@@ -116,28 +117,15 @@ Searched search_from(HammersteinWiener start, const Data& data, Method method, c
   return s;
 }
 
-/// From the best end of short searches with the trust region method: each place of the corners leads to a minimum of
-/// its own.
+/// From the best place for the corners.
 Searched search_from_best_place(const Searched& linear, const model::CellParameters<>& cell, const Data& data,
                                 double soc, Method method, const Stopping& stopping) {
-  Stopping few;
-  few.iterations = 40;
-  Searched best;
-  best.found.cost = INFINITY;
-  for (const double below : {0.0, 0.5, 1.0}) {
-    for (const double above : {0.0, 0.5, 1.0}) {
-      Searched s;
-      s.blocks =
-          begin_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc, {below, above});
-      s.problem = simulation_error(data, s.blocks);
-      const Eigen::VectorXd x = to_unknowns(with_curves(s.blocks, s.problem, few));
-      s.found = minimise(s.problem, x, Method::trust_region_reflective, few);
-      if (s.found.cost < best.found.cost) best = std::move(s);
-    }
-  }
-  best.found = minimise(best.problem, Eigen::VectorXd(best.found.x), method, stopping);
-  best.blocks = with_unknowns(best.blocks, best.found.x);
-  return best;
+  Searched s;
+  s.blocks = find_hammerstein_wiener(linear.blocks.linear, linear.blocks.structure, cell.ocv, data, soc);
+  s.problem = simulation_error(data, s.blocks);
+  s.found = minimise(s.problem, to_unknowns(s.blocks), method, stopping);
+  s.blocks = with_unknowns(s.blocks, s.found.x);
+  return s;
 }
 
 /// From a given start: without a search for the place of the corners.
@@ -183,6 +171,13 @@ LinearIdentification identify_linear(LinearKind kind, const model::CellParameter
         fmt::format("resampled: the sampling is uneven, so this model uses the recording resampled to {:.3g} s; {} "
                     "samples lie in gaps",
                     even.step_s, even.gap_samples));
+  }
+  const Whiteness test = whiteness(residuals.head(samples));
+  if (hw && !test.white()) {
+    found.warnings.push_back(
+        fmt::format("correlated_residuals: the residuals are not white noise (Ljung-Box {:.0f}, limit {:.0f}), so the "
+                    "model lacks something or the search ended in another minimum; no confidence band is given",
+                    test.statistic, test.limit));
   }
   if (!found.optimum.converged) found.warnings.push_back("not_converged: " + found.optimum.reason);
   return out;

@@ -39,6 +39,18 @@ double correlation_length(const Eigen::VectorXd& residuals) {
   return length;
 }
 
+Whiteness whiteness(const Eigen::VectorXd& residuals) {
+  constexpr Eigen::Index lags = 20;
+  Whiteness test{0, 37.566};  // chi-squared of 20 degrees of freedom, 99 %
+  const double power = residuals.squaredNorm();
+  const Eigen::Index n = residuals.size();
+  if (!(power > 0) || n <= lags) return test;
+  for (Eigen::Index lag = 1; lag <= lags; ++lag)
+    test.statistic += std::pow(product(residuals, residuals, lag) / power, 2) / static_cast<double>(n - lag);
+  test.statistic *= static_cast<double>(n * (n + 2));
+  return test;
+}
+
 ResidualAnalysis analyse(const Eigen::VectorXd& residuals, const Eigen::VectorXd& current, int lags) {
   ResidualAnalysis a;
   const auto n = static_cast<double>(residuals.size());

@@ -27,6 +27,14 @@ Eigen::VectorXd without_missing(const Eigen::VectorXd& values);
 /// Samples over which residuals are correlated: 1 + 2 * sum of the autocorrelation up to its first zero. 1: white.
 double correlation_length(const Eigen::VectorXd& residuals);
 
+/// The portmanteau test: are residuals white noise? (Ljung and Box, Biometrika 65 (1978) 297)
+struct Whiteness {
+  double statistic = 0;
+  double limit = 0;  ///< white residuals exceed it in 1 % of cases
+  bool white() const { return statistic <= limit; }
+};
+Whiteness whiteness(const Eigen::VectorXd& residuals);
+
 /// Error of the k-step prediction of the voltage at each sample from k on. The prediction is the simulation plus the
 /// last known residual, which decays by fading_per_step (first-order disturbance). residuals: measured minus simulated.
 Eigen::VectorXd prediction_error(const Eigen::VectorXd& residuals, int k, double fading_per_step);

@@ -55,6 +55,13 @@ std::string json_of(const study::PaperDiagnosis& d) {
                                   {"weight", c.weight},
                                   {"table7", match_of(c.table7)}});
   }
+  for (const study::TableMisfit& m : d.misfits) {
+    json["table_misfits"].push_back({{"table", m.table},
+                                     {"in_fit", m.used},
+                                     {"left_out", m.left_out ? Json(*m.left_out) : Json(nullptr)},
+                                     {"limit", m.limit},
+                                     {"contradicts", m.contradicts()}});
+  }
   for (const study::Contradiction& c : d.contradictions)
     json["contradictions"].push_back({{"figure", c.figure}, {"published", c.published}, {"simulated", c.simulated}});
   json["wall_s"] = d.seconds;

@@ -164,6 +164,10 @@ class Predictions {
     const int points = without_table7(split) ? options_->screening_points : 0;
     simulated_[wanted_[number]] = fit_.simulate(fit_.searched(split.used, points, options_->iterations));
   }
+  /// By table, predicted from all others.
+  std::vector<std::vector<Figure>> tables_left_out() const {
+    return {simulated_.begin(), simulated_.begin() + figure_group_names.size()};
+  }
   std::vector<HeldOut> results() const {
     std::vector<HeldOut> out;
     for (std::size_t k = 0; k < splits_.size(); ++k) {
@@ -348,7 +352,8 @@ PaperDiagnosis diagnose_paper(const model::CellParameters<>& cell, const PaperDi
   }
   d.simulated = best.simulated;
   d.contradictions = contradictions_of(best.simulated, fit.published());
-  d.statement = statement_of(d);
+  d.misfits = table_misfits(best.simulated, of_best.tables_left_out(), fit.published());
+  d.statement = statement_of(d) + " " + reconciliation_text(d.misfits);
   d.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
   return d;
 }

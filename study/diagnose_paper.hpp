@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "study/paper_figures.hpp"
+#include "study/reconciliation.hpp"
 #include "study/study.hpp"
 
 namespace bms::study {
@@ -70,6 +70,7 @@ struct PaperDiagnosis {
   std::vector<HeldOut> held_out;
   std::vector<HeldOut> held_out_plain;  ///< those of Table 7 by the equations of the paper alone; the others are empty
   std::vector<Contradiction> contradictions;
+  std::vector<TableMisfit> misfits;
   std::vector<Figure> simulated;  ///< by the best candidate, in the order of published_figures()
   std::string statement;          ///< for the reader
   double seconds = 0;

@@ -78,6 +78,20 @@ files::PageTable contradiction_table(const PaperDiagnosis& d) {
   return table;
 }
 
+files::PageTable misfit_table(const PaperDiagnosis& d) {
+  files::PageTable table{
+      "misfits",
+      "Tables against the best candidate",
+      {"table", "in the fit", "from all other tables", "1 % limit", "largest difference", "meaning"},
+      {},
+      "In units of the difference that is expected between two such experiments. Single differences are limited."};
+  for (const TableMisfit& m : d.misfits)
+    table.rows.push_back({label(m.table), number_cell(m.used), m.left_out ? number_cell(*m.left_out) : label("-"),
+                          number_cell(m.limit), label(fmt::format("{} ({:.1f})", m.worst_figure, m.worst)),
+                          label(m.verdict())});
+  return table;
+}
+
 files::PageTable consistency_table() {
   files::PageTable table{"consistency",
                          "Published figures that contradict each other, or the text",
@@ -92,8 +106,8 @@ files::PageTable consistency_table() {
 }  // namespace
 
 std::vector<files::PageTable> tables_of(const PaperDiagnosis& d) {
-  return {consistency_table(), physics_table(d), candidate_table(d),
-          held_out_table(d),   table7(d),        contradiction_table(d)};
+  return {consistency_table(), physics_table(d), candidate_table(d),    held_out_table(d),
+          misfit_table(d),     table7(d),        contradiction_table(d)};
 }
 
 }  // namespace bms::study

@@ -18,6 +18,9 @@ inline constexpr std::array<const char*, 5> figure_group_names = {"7", "8", "6",
 /// each experiment, and each figure of the others.
 inline constexpr std::array<double, 5> independent_figures = {14, 14, 3, 2, 3};
 
+/// RMS difference that is expected between two such experiments, of the logarithms, by group.
+inline constexpr std::array<double, 5> expected_difference = {0.3, 0.6, 0.5, 0.3, 0.5};
+
 struct Figure {
   FigureGroup group;
   std::string name;

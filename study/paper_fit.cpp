@@ -12,8 +12,6 @@ namespace {
 
 constexpr double difference_step = 0.05;  // of a logarithm
 constexpr double screened_range = 0.7;    // of a logarithm, on either side of the start
-/// By table: as large as those between two such experiments.
-constexpr std::array<double, 5> expected_difference = {0.3, 0.6, 0.5, 0.3, 0.5};
 
 /// The prior of a variance has the information of one figure, as the prior behind the penalty of Schwarz has.
 constexpr double prior_freedom = 1;

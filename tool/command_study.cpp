@@ -193,7 +193,8 @@ void diagnose_paper(const StudyOptions& options, const files::CellFile& cell) {
   }
   if (!options.output.json.empty()) write_output(options.output.json, json);
   if (!options.output.report.empty()) write_output(options.output.report, page);
-  write_to_readme(options.readme, tables, {"physics", "candidates", "held_out", "contradictions", "consistency"});
+  write_to_readme(options.readme, tables,
+                  {"physics", "candidates", "held_out", "misfits", "contradictions", "consistency"});
   std::string text = found.statement + "\n";
   for (const study::PaperPhysics& p : found.physics)
     text += fmt::format("  {:22} {:.4g} {} ({:.3g} to {:.3g})\n", p.id, p.value, p.unit, p.low, p.high);

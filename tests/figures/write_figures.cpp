@@ -10,6 +10,7 @@
 //   budgets       flash, RAM and stack of the boards
 //   trials        state of charge on real recordings
 //   fixed         fixed point against double, and the microbit against the host
+//   identification  speed; coverage of the bands of the Hammerstein-Wiener model
 //
 // Figures of recordings that are missing stay unchanged. Speeds are those of this machine.
 #include <algorithm>
@@ -36,6 +37,7 @@
 #include "study/study.hpp"
 #include "tests/estimator/duty.hpp"
 #include "tests/figures/fixed_point.hpp"
+#include "tests/figures/hammerstein_wiener_bands.hpp"
 #include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/step_cost.hpp"
@@ -423,6 +425,13 @@ void write_accuracy() {
   files::replace_figures(source / "estimator/README.md", "duty", thousand_hours());
 }
 
+void write_identification() {
+  constexpr std::uint64_t bands_seed = 901;
+  const auto readme = source / "identification/README.md";
+  files::replace_figures(readme, "bands", hammerstein_wiener_bands(bands_seed));
+  files::replace_figures(readme, "speed", identification_speed());
+}
+
 void run() {
   write_board();
   write_front_page();
@@ -436,7 +445,7 @@ void run() {
   files::replace_figures(source / "host_sim/README.md", "speed", speed());
   if (std::filesystem::exists(data))
     files::replace_figures(source / "identification/README.md", "real", real_identification());
-  files::replace_figures(source / "identification/README.md", "speed", identification_speed());
+  write_identification();
 }
 
 }  // namespace
@@ -462,6 +471,8 @@ int main(int argc, char** argv) {
       bms::write_trials();
     else if (argc > 1 && std::string_view(argv[1]) == "fixed")
       bms::files::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
+    else if (argc > 1 && std::string_view(argv[1]) == "identification")
+      bms::write_identification();
     else
       bms::run();
     return 0;

@@ -76,6 +76,32 @@ TEST(PaperDiagnosis, FindsNothingWhereNothingIsPlanted) {
   const PaperDiagnosis d = diagnosed(figures_of_another(0, 0), {hysteresis, none});
   EXPECT_FALSE(d.candidates.front().effects.hysteresis) << value_of(d, "half_gap_v");
   EXPECT_NE(d.effects.front().present, true);
+  for (const TableMisfit& m : d.misfits) EXPECT_FALSE(m.contradicts()) << m.table << " " << m.used;
+}
+
+TEST(PaperDiagnosis, NamesTheTableThatNoCellReconciles) {
+  std::vector<Figure> published = figures_of_another(0, 0);
+  for (Figure& f : published) {
+    if (f.group == FigureGroup::appendix_a) f.value *= f.name == "r1_ohm" ? 1.0 / 8 : 8;
+  }
+  const PaperDiagnosis d = diagnosed(std::move(published), {none});
+  for (const TableMisfit& m : d.misfits)
+    EXPECT_EQ(m.contradicts(), m.table == "Appendix A") << m.table << " " << m.used;
+  EXPECT_NE(d.statement.find("contradicts Appendix A"), std::string::npos) << d.statement;
+}
+
+TEST(TableMisfits, SayWhichTableOnlyItselfDetermines) {
+  const std::vector<Figure> published = published_figures();
+  std::vector<std::vector<Figure>> left_out(1, published);
+  for (Figure& f : left_out.front()) {
+    if (f.group == FigureGroup::table7) f.value = 100 - 2 * (100 - f.value);
+  }
+  const std::vector<TableMisfit> misfits = table_misfits(published, left_out, published);
+  EXPECT_FALSE(misfits.front().contradicts());
+  EXPECT_FALSE(misfits.front().predicted());
+  EXPECT_TRUE(misfits.back().predicted());
+  EXPECT_EQ(reconciliation_text(misfits),
+            "No table contradicts this cell as a whole. The other tables do not predict Table 7.");
 }
 
 // Figures without scatter: other resistances look like a small hysteresis.
