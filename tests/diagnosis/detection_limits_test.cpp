@@ -8,6 +8,8 @@
 #include <cmath>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/predicted_band.hpp"
+#include "diagnosis/prepare.hpp"
 #include "diagnosis/sensor_end.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
@@ -43,6 +45,21 @@ TEST(DetectionLimits, WithHealthyRecordingsASizeStandsOutFromThem) {
 
 TEST(DetectionLimits, BeyondTheBoundsNoneIsStated) {
   EXPECT_THAT(limits_of({{offset, 1.0}}, leaves(0), 6, {}), IsEmpty());
+}
+
+TEST(PredictedBand, HoldsAHealthyRecordingAndNotAWrongVoltage) {
+  const auto share_within = [](double add_v) {
+    const PreparedRecording r = test::recorded(test::drive(1, 21), 0.7, 21, [&](auto...) { return add_v; });
+    const LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, {r});
+    const std::vector<double> sigma_v = predicted_sigma_v(likelihood, 0),
+                              file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
+    double within = 0;
+    for (std::size_t k = 0; k < r.size(); ++k)
+      within += std::abs(r.voltage_v[k] - file_v[k]) <= 1.96 * sigma_v[k] ? 1 : 0;
+    return within / static_cast<double>(r.size());
+  };
+  EXPECT_GT(share_within(0), 0.9);
+  EXPECT_LT(share_within(0.05), 0.2);
 }
 
 /// Rows of a drive whose current differs from row to row.
