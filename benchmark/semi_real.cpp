@@ -145,7 +145,7 @@ void print_band(const RealSet& set, const Prepared& p) {
       bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
   const bms::diagnosis::LikelihoodModel likelihood =
       bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record}, p.cell.healthy.regimes);
-  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0),
+  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy.regimes),
                             file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
   std::size_t within = 0, of = 0;
   bms::measurement::MeanSquare error, band;

@@ -48,10 +48,10 @@ TEST(DetectionLimits, BeyondTheBoundsNoneIsStated) {
 }
 
 TEST(PredictedBand, HoldsAHealthyRecordingAndNotAWrongVoltage) {
-  const auto share_within = [](double add_v) {
+  const auto share_within = [](double add_v, const std::vector<measurement::HealthyRegime>& regimes = {}) {
     const PreparedRecording r = test::recorded(test::drive(1, 21), 0.7, 21, [&](auto...) { return add_v; });
     const LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, {r});
-    const std::vector<double> sigma_v = predicted_sigma_v(likelihood, 0),
+    const std::vector<double> sigma_v = predicted_sigma_v(likelihood, 0, regimes),
                               file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
     double within = 0;
     for (std::size_t k = 0; k < r.size(); ++k)
@@ -60,6 +60,7 @@ TEST(PredictedBand, HoldsAHealthyRecordingAndNotAWrongVoltage) {
   };
   EXPECT_GT(share_within(0), 0.9);
   EXPECT_LT(share_within(0.05), 0.2);
+  EXPECT_GT(share_within(0.05, {{"soc", 0, 1, 2, 0, 0.04, 0.01}}), 0.9) << "healthy recordings were as wrong";
 }
 
 /// Rows of a drive whose current differs from row to row.
