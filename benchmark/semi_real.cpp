@@ -20,6 +20,8 @@
 
 #include "benchmark/injected_faults.hpp"
 #include "benchmark/semi_real_tables.hpp"
+#include "diagnosis/predicted_band.hpp"
+#include "diagnosis/prepare.hpp"
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
@@ -40,7 +42,7 @@ struct Options {
   std::vector<std::string> faults;  ///< empty: all
   std::vector<double> times_limit;  ///< sizes, in stated detection limits; empty: those of the fault
   double false_alarm_rate = 0.01;
-  bool nulls_only = false, without_healthy = false;
+  bool nulls_only = false, without_healthy = false, bands_only = false;
 };
 
 struct RealSet {
@@ -137,6 +139,31 @@ Prepared prepare(const Options& o, const RealSet& set) {
   return p;
 }
 
+/// Of the recording that is left out: how many readings lie within 1.96 standard deviations of the prediction.
+void print_band(const RealSet& set, const Prepared& p) {
+  const bms::diagnosis::PreparedRecording record =
+      bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
+  const bms::diagnosis::LikelihoodModel likelihood =
+      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record}, p.cell.healthy.regimes);
+  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy.regimes),
+                            file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
+  std::size_t within = 0, of = 0;
+  bms::measurement::MeanSquare error, band;
+  for (std::size_t k = 0; k < record.size(); ++k) {
+    const double e = record.voltage_v[k] - file_v[k];
+    if (!std::isfinite(e)) continue;
+    constexpr double two_sided_95 = 1.96;
+    within += std::abs(e) <= two_sided_95 * sigma_v[k] ? 1 : 0;
+    ++of;
+    error.add(e);
+    band.add(two_sided_95 * sigma_v[k]);
+  }
+  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name,
+             100 * static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(of, 1)), 1e3 * error.root(),
+             1e3 * band.root());
+  std::fflush(stdout);
+}
+
 /// Standard deviations between the found size and the true one, if the fault itself was named.
 std::optional<double> sigmas_of(const Finding& f, const InjectedFault& fault, double size, double capacity_ah) {
   if (bms::model::catalogue[f.setting.index].id != fault.id || fault.first_parameter == nullptr) return std::nullopt;
@@ -231,12 +258,18 @@ void run(const Options& o) {
   const auto wanted = [&](std::string_view id) {
     return o.faults.empty() || std::find(o.faults.begin(), o.faults.end(), id) != o.faults.end();
   };
+  if (o.bands_only)
+    fmt::print("| cell | set | within the 95 % band | error, RMS | band, RMS |\n|---|---|---|---|---|\n");
   for (const RealSet& set : read_sets(o)) {
     Prepared p;
     try {
       p = prepare(o, set);
     } catch (const std::runtime_error& error) {  // no cell file, no case
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
+      continue;
+    }
+    if (o.bands_only) {
+      print_band(set, p);
       continue;
     }
     std::map<std::string, double> limits;
@@ -251,6 +284,7 @@ void run(const Options& o) {
       }
     }
   }
+  if (o.bands_only) return;
   fmt::print("{}", table_of(results));
   if (!o.json.empty()) bms::files::write_file(o.json, json_of(results));
 }
@@ -273,6 +307,7 @@ int main(int argc, char** argv) {
       ->type_name("X");
   app.add_option("--false-alarm-rate", o.false_alarm_rate, "as of bms diagnose")->capture_default_str();
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
+  app.add_flag("--bands", o.bands_only, "diagnose nothing: how many readings lie within the band of the prediction");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
   try {
     app.parse(argc, argv);

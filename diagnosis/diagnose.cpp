@@ -7,6 +7,7 @@
 
 #include "diagnosis/adequacy.hpp"
 #include "diagnosis/block_covariance.hpp"
+#include "diagnosis/detection_limits.hpp"
 #include "diagnosis/findings.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/one_current.hpp"
@@ -42,19 +43,6 @@ bool is_uninformative(const LikelihoodModel& likelihood, Diagnosis& d) {
   d.statement = "No diagnosis is possible: " + *why + ". Record several minutes with a changing load.";
   for (std::size_t m = 0; m < model::mechanism_count; ++m) d.not_testable.push_back({m, *why});
   return true;
-}
-
-/// What each mechanism must have at least to be found, from the screen around the calibration.
-std::vector<DetectionLimit> detection_limits(LikelihoodModel& likelihood, const NoiseModel& nominal,
-                                             const HypothesisFit& control, const Scope& scope) {
-  likelihood.set_noise(nominal);
-  const Screen screen(likelihood, control, scope.searched);
-  std::vector<DetectionLimit> limits;
-  for (const Candidate& c : screen.candidates()) {
-    const DetectionLimit limit{c.mechanism, 0, c.limit};
-    if (c.limit > 0 && is_reachable(limit, likelihood.cell().capacity_ah)) limits.push_back(limit);
-  }
-  return limits;
 }
 
 /// Strengths that a technician can judge, around the result.
@@ -230,7 +218,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   const HypothesisFit control = search.with_own_noise(likelihood.fit(likelihood.base()));
   search.report("calibration");
   const Grown grown = grow(search, control, scope, options.most_mechanisms);
-  d.limits = detection_limits(likelihood, search.nominal_noise(), control, scope);
+  const std::vector<StrengthSigma> sigmas = strength_sigmas(likelihood, search.nominal_noise(), control, scope);
   search.report("noise");
   Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
   d.gains = gains_of(grown, survivors);
@@ -241,6 +229,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     survivors = without_uncertain(search, likelihood, control, std::move(survivors));
   }
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
+  HealthyGain stands_out;
+  if (judge_healthy) stands_out = [&](std::size_t mechanism) { return judge_healthy->gain_needed(mechanism); };
+  d.limits = limits_of(sigmas, adequacy.residual, cell.capacity_ah, stands_out);
   d.unknown_gain = unknown_gain(adequacy.residual);
   if (options.learns && adequacy.found)
     d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));
@@ -248,9 +239,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     judge_healthy->withhold_unknown(adequacy);
     d.healthy = judge_healthy->basis();
     d.withheld = judge_healthy->withheld();
-    d.limits = judge_healthy->raised(d.limits);
-    include_model_error(likelihood, survivors.best);
   }
+  include_model_error(likelihood, survivors.best);
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   d.findings = findings_of(search, survivors, contributed);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "diagnosis/charge_count.hpp"
+#include "diagnosis/sensor_end.hpp"
 #include "diagnosis/simulation_run.hpp"
 #include "diagnosis/thresholds.hpp"
 
@@ -56,6 +57,7 @@ void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
   RowNoise& more = row_noise_.emplace_back(r.size());
   const double soc_error = noise_limits.soc_error_share * r.initial_soc_sigma, reach = noise_limits.ocv_slope_reach,
                r0_ohm = model::cell_detail::rc_value(cell_.rc, cell_.rc.r0_ohm, numerics.middle_soc);
+  const SensorEnd end = sensor_end(r, noise_limits.quiet_c * cell_.capacity_ah, cell_.noise.voltage_v);
   double soc = r.initial_soc;  // held within 0..1: a count that has drifted outside says nothing about the slope
   std::uint8_t interval = 0;
   const auto ocv_v = [&](double at) { return model::look_up(tables_, at, interval).ocv_v; };
@@ -72,6 +74,7 @@ void LikelihoodModel::set_row_noise(const PreparedRecording& r) {
     more.slow_v2[k] =
         std::pow(soc_error * (ocv_v(soc + reach) - ocv_v(soc - reach)) / (2 * reach), 2) + learned_.more_at(soc);
     more.white_v2[k] += std::pow(noise_limits.white_share_of_ocv, 2) * learned_.more_at(soc);
+    if (end.holds(row.current_a)) more.white_v2[k] += end.spread_v * end.spread_v;
   });
 }
 

@@ -66,6 +66,7 @@ class LikelihoodModel {
   std::size_t used() const;
   const std::vector<char>& usable(std::size_t record) const { return usable_[record]; }
   const Whitener& whitener(std::size_t record) const { return whiteners_[record]; }
+  const RowNoise& row_noise(std::size_t record) const { return row_noise_[record]; }
   /// The cell as its file describes it.
   Hypothesis base() const;
   /// The base parameters' unknowns that leave the cell file as it is.

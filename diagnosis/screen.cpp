@@ -52,9 +52,8 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
     best_.push_back({p, gram});
     c = candidates_.end() - 1;
   }
-  const double sigma = std::sqrt(std::max(regular.inverse()(0, 0), 0.0)),  // its places free
-      limit = screening_limits.limit_sigma * sigma;
-  if (c->limit == 0 || limit < c->limit) c->limit = limit;
+  const double sigma = std::sqrt(std::max(regular.inverse()(0, 0), 0.0));  // its places free
+  if (c->least_sigma == 0 || sigma < c->least_sigma) c->least_sigma = sigma;
   if (gain <= c->gain || std::isnan(gain)) return;
   c->gain = gain;
   c->estimate = found[0] + p.setting.value[p.parameters[0]];

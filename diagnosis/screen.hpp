@@ -2,8 +2,6 @@
 // parameters already in the fit are projected out.
 //
 //   gain   decrease of the whitened sum of squares; a first-order estimate of what a fit will find
-//   limit  strength that would be found in 9 of 10 recordings like this one at one false alarm in 100
-//          (Thresholds::Screening::limit_sigma)
 //   alike  correlation of what two mechanisms explain: near 1, this recording cannot distinguish them
 #pragma once
 
@@ -22,8 +20,8 @@ struct Candidate {
   MechanismSetting start;                        ///< estimate from the signature, where a fit begins
   std::vector<std::vector<model::Span>> bursts;  ///< by record; of a loose contact only
   double gain = 0;                               ///< less what its number of unknowns gains on noise
-  double limit = 0;                              ///< of its first strength, in its unit; 0: not estimated
   double estimate = 0, sigma = 0;                ///< of its first strength, to first order; sigma 0: not estimated
+  double least_sigma = 0;                        ///< the least over its probes; 0: not estimated
 };
 
 class Screen {

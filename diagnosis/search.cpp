@@ -19,24 +19,13 @@ constexpr const Thresholds::Decision& search_limits = thresholds.decision;
 constexpr const Thresholds::Screening& candidate_limits = thresholds.screening;
 constexpr const Numerics::Search& search_numerics = numerics.search;
 
-/// What the unknowns of a mechanism cost. What is known of most cells is not an unknown.
-double price(std::size_t mechanism) {
-  double unknowns = 0;
-  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) {
-    const model::Parameter& parameter = catalogue[mechanism].parameter[p];
-    unknowns += parameter.role != Role::given && parameter.spread == 0 ? 1 : 0;
-  }
-  unknowns += knowledge_of(mechanism).searched_unknowns;
-  return search_limits.per_unknown * (unknowns - 1);
-}
-
 double price(const Hypothesis& h) {
   double sum = 0;
   std::size_t bursts = 0;
   for (const auto& spans : h.bursts) bursts += spans.size();
   for (const std::size_t m : h.added()) {
     const bool in_bursts = knowledge_of(m).signature == Signature::contact_bursts;
-    sum += price(m) + search_limits.per_burst * static_cast<double>(in_bursts ? bursts : 0);
+    sum += price_of_unknowns(m) + search_limits.per_burst * static_cast<double>(in_bursts ? bursts : 0);
   }
   return sum;
 }
@@ -95,6 +84,16 @@ double& onset_of(Hypothesis& h) {
 }
 
 }  // namespace
+
+double price_of_unknowns(std::size_t mechanism) {
+  double unknowns = 0;
+  for (std::size_t p = 0; p < catalogue[mechanism].parameters; ++p) {
+    const model::Parameter& parameter = catalogue[mechanism].parameter[p];
+    unknowns += parameter.role != Role::given && parameter.spread == 0 ? 1 : 0;
+  }
+  unknowns += knowledge_of(mechanism).searched_unknowns;
+  return search_limits.per_unknown * (unknowns - 1);
+}
 
 double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h) {
   return reading_error_v(likelihood, likelihood.raw_residual(h, likelihood.unchanged()));

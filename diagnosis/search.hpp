@@ -24,6 +24,9 @@ using Stopped = std::function<bool()>;
 /// file would achieve.
 double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h);
 
+/// What the unknowns of a mechanism cost. What is known of most cells is not an unknown.
+double price_of_unknowns(std::size_t mechanism);
+
 class Search {
  public:
   /// All must outlive it. Its noise model is taken as the nominal one.

@@ -152,6 +152,10 @@ struct Thresholds {
     double rail_c = 0.2;       ///< [C] the largest current at least, to see a sensor's end
     double rail_share = 0.9;   ///< of the largest current that is near the end
     std::size_t rail_rows = 4, rail_runs = 2;  ///< rows near it and separate visits needed
+    double stands_within = 0.005;              ///< of the largest current within which a reading stands at its end
+    std::size_t stands_before = 3;             ///< rows of a visit there before its voltage counts
+    std::size_t stands_rows = 8;               ///< rows there, after others there, that are needed
+    double stands_noise = 5;                   ///< times its noise by which the voltage goes on moving there
     double one_current_within = 0.1;           ///< from their median within which currents are one size
     double one_current_share = 0.98;           ///< of the loaded rows with it: the rest are the load's ends
     std::size_t one_current_edges = 6;         ///< steps of the current at most: more show the resistance by themselves
@@ -172,8 +176,8 @@ struct Thresholds {
     std::size_t rivals = 5;          ///< at most, of mechanisms in the place of another
     double rival_share = 0.1;        ///< of the gain of the mechanism that a rival's first-order gain must reach
     double per_unknown = 2;          ///< gain that noise alone gives to every unknown after the first
-    double limit_sigma = 4.76;       ///< detection limit in standard deviations of the strength: found in 9 of 10
-                                     ///< recordings at one false alarm in 100
+    double limit_margin = 1.28;      ///< standard deviations of a strength above the smallest that is named, from which
+                                     ///< it is named in 9 of 10 recordings
     double start_share = 0.6;        ///< a fit begins within this share of the bounds
     std::size_t moments = 40;        ///< onsets tried of a contact that has changed
     std::size_t moments_margin = 2;  ///< of them left out at each end of the recording

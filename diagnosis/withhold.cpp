@@ -63,11 +63,6 @@ std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivo
   return list;
 }
 
-bool is_reachable(const DetectionLimit& limit, double capacity_ah) {
-  const model::Parameter& p = model::catalogue[limit.mechanism].parameter[limit.parameter];
-  return limit.value <= std::max(std::abs(p.lower(capacity_ah)), std::abs(p.upper(capacity_ah)));
-}
-
 double unknown_gain(const ResidualTest& residual) {
   return thresholds.decision.detected * std::max({residual.gain / thresholds.adequacy.unexplained,
                                                   residual.far_out / thresholds.adequacy.far_out, 0.0});
@@ -125,18 +120,9 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
   return found;
 }
 
-std::vector<DetectionLimit> HealthyJudge::raised(const std::vector<DetectionLimit>& limits) const {
-  std::vector<DetectionLimit> higher;
-  if (!is_covered()) return higher;
-  constexpr double usual = thresholds.screening.limit_sigma * thresholds.screening.limit_sigma;
-  for (const DetectionLimit& limit : limits) {
-    const auto needed = null_.gain_needed(std::string(model::catalogue[limit.mechanism].id));
-    if (!needed) continue;
-    DetectionLimit needed_limit = limit;
-    needed_limit.value *= std::sqrt(std::max(1.0, *needed / usual));
-    if (is_reachable(needed_limit, likelihood_.cell().capacity_ah)) higher.push_back(needed_limit);
-  }
-  return higher;
+std::optional<double> HealthyJudge::gain_needed(std::size_t mechanism) const {
+  if (!is_covered()) return std::nullopt;
+  return null_.gain_needed(std::string(model::catalogue[mechanism].id));
 }
 
 void HealthyJudge::withhold_unknown(Adequacy& adequacy) {

@@ -14,9 +14,6 @@ namespace bms::diagnosis {
 /// Gain of every mechanism that was added or has survived.
 std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivors);
 
-/// Returns true if a value of the parameter is as large as its limit: others would never be named.
-bool is_reachable(const DetectionLimit& limit, double capacity_ah);
-
 /// Gain of an unknown cause, on the scale of a mechanism's gain.
 double unknown_gain(const ResidualTest& residual);
 
@@ -33,8 +30,8 @@ class HealthyJudge {
   /// left is compared with its rivals again.
   Survivors without_withheld(Survivors found);
 
-  /// Limits at which a mechanism would stand out; without those of mechanisms that could not.
-  std::vector<DetectionLimit> raised(const std::vector<DetectionLimit>& limits) const;
+  /// The smallest gain at which a mechanism would stand out; nothing if it could not.
+  std::optional<double> gain_needed(std::size_t mechanism) const;
 
   /// Takes back an unknown cause that does not stand out.
   void withhold_unknown(Adequacy& adequacy);

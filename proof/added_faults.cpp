@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/quantity_text.hpp"
 #include "experiments/splitmix.hpp"
 #include "proof/claims.hpp"
 #include "proof/procedure.hpp"
@@ -137,6 +138,20 @@ Fault read_fault(files::TomlTable& table) {
   return fault;
 }
 
+/// Whether the diagnosis of the unchanged recording says that it would have revealed a fault of this size.
+Visibility visibility_of(const Fault& fault, const std::vector<double>& added, const diagnosis::Diagnosis& healthy) {
+  const std::size_t mechanism = model::mechanism_index(fault.mechanism);
+  for (const diagnosis::DetectionLimit& limit : healthy.limits) {
+    const model::Parameter& parameter = model::catalogue[mechanism].parameter[limit.parameter];
+    if (limit.mechanism != mechanism) continue;
+    for (std::size_t k = 0; k < fault.sizes.size(); ++k) {
+      if (fault.sizes[k].parameter.parameter == parameter.name)
+        return {diagnosis::parameter_text(parameter, limit.value, 0), std::abs(added[k]) >= limit.value};
+    }
+  }
+  return {};
+}
+
 class AddedFaults : public Procedure {
  public:
   AddedFaults(files::TomlTable& file, files::TomlTable& claims)
@@ -152,21 +167,25 @@ class AddedFaults : public Procedure {
     e.notes.push_back("The unchanged recording: " + summary_of(unchanged));
     ProofPoints points{"Diagnosed size over added size", "", "diagnosed / added", {}, {}};
     points.predicted.push_back({"diagnosed", {}});
+    const diagnosis::Diagnosis& healthy = lab.diagnosed(unchanged.extended_cell, {recording_}).diagnosis;
     for (const Fault& fault : faults_) {
-      claim_fault(lab, unchanged.extended_cell, fault, points, e);
+      claim_fault(lab, unchanged.extended_cell, healthy, fault, points, e);
       points.names.push_back(fault.mechanism);
     }
     e.points.push_back(std::move(points));
   }
 
  private:
-  void claim_fault(ProofLab& lab, const files::CellFile& cell, const Fault& fault, ProofPoints& points,
-                   ProofExperiment& e) const {
+  void claim_fault(ProofLab& lab, const files::CellFile& cell, const diagnosis::Diagnosis& healthy, const Fault& fault,
+                   ProofPoints& points, ProofExperiment& e) const {
     Recording r = lab.recording(recording_);
     const std::vector<double> added = fault.add(r, fault.amount);
     const workflow::DiagnoseResult& d = lab.diagnosed(cell, recording_ + ", " + fault.text, {r});
     const Words words = {{"mechanism", fault.mechanism}, {"fault", fault.text}};
-    add_named(e, {named_, {fault.mechanism}}, words, d);
+    const Visibility visibility = visibility_of(fault, added, healthy);
+    // another name is never right
+    const bool visible = visibility.visible || d.diagnosis.verdict != diagnosis::Verdict::no_mismatch;
+    add_named(e, {named_, {fault.mechanism}}, words, d, visibility);
     for (std::size_t k = 0; k < fault.sizes.size(); ++k) {
       const FaultSize& size = fault.sizes[k];
       Words size_words = words;
@@ -176,7 +195,8 @@ class AddedFaults : public Procedure {
                   .diagnosed = summary_of(d),
                   .measured = {added[k], 0},
                   .tolerance = size.tolerance.value_or(size.tolerance_fraction * added[k]),
-                  .unit = size.unit});
+                  .unit = size.unit,
+                  .visible = visible});
     }
     const double x = static_cast<double>(points.measured.size() + 1);
     points.measured.push_back({x, 1, 0});

@@ -100,14 +100,18 @@ ErrorClaim read_error_claim(files::TomlTable& claims, const std::string& name,
   return claim;
 }
 
-void add_named(ProofExperiment& e, const NamedClaim& named, const Words& words, const workflow::DiagnoseResult& r) {
+void add_named(ProofExperiment& e, const NamedClaim& named, const Words& words, const workflow::DiagnoseResult& r,
+               const Visibility& visibility) {
   std::string expected;
-  bool holds = false;
+  bool holds = !visibility.visible && r.diagnosis.verdict == diagnosis::Verdict::no_mismatch;
   for (const std::string& id : named.mechanisms) {
     expected += (expected.empty() ? "" : " or ") + id;
     holds = holds || is_named_or_equivalent(r, id);
   }
-  add_outcome(e, named.text, words, {summary_of(r), "named, alone or among others: " + expected, holds});
+  expected = "named, alone or among others: " + expected;
+  if (!visibility.visible)
+    expected += fmt::format("; or NO_MISMATCH, because the stated limit is {}", visibility.limit);
+  add_outcome(e, named.text, words, {summary_of(r), expected, holds});
 }
 
 void add_number(ProofExperiment& e, const ClaimText& text, const Words& words, const ComparedNumber& n) {
@@ -115,13 +119,14 @@ void add_number(ProofExperiment& e, const ClaimText& text, const Words& words, c
   ProofClaim& claim = add(e, text, words);
   claim.claimed = "no size; " + n.diagnosed;
   claim.measured = with_unit(n.measured.value, n.measured.sigma) + ", " + claim.measured;
-  claim.tolerance = "within " + with_unit(n.tolerance, 0);
+  claim.tolerance = "within " + with_unit(n.tolerance, 0) + (n.visible ? "" : ", or no size: below the stated limit");
   claim.number = ProofNumber{.claimed = {},
                              .claimed_sigma = 0,
                              .measured = n.measured.value,
                              .measured_sigma = n.measured.sigma,
                              .allowed = n.tolerance,
                              .unit = n.unit};
+  claim.holds = !n.visible;
   if (!n.claimed) return;
   claim.number->claimed = n.claimed->value;
   claim.number->claimed_sigma = n.claimed->sigma;

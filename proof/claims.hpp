@@ -63,10 +63,17 @@ struct ComparedNumber {
   Value measured;
   double tolerance = 0;
   std::string unit;
+  bool visible = true;  ///< false: "no size" is right as well
+};
+
+/// A cause that may be too small for a recording.
+struct Visibility {
+  std::string limit;    ///< stated beforehand, in words; empty: none is stated
+  bool visible = true;  ///< false: it is below that limit, and naming nothing is right as well
 };
 
 void add_named(ProofExperiment& experiment, const NamedClaim& claim, const Words& words,
-               const workflow::DiagnoseResult& diagnosis);
+               const workflow::DiagnoseResult& diagnosis, const Visibility& visibility = {});
 void add_number(ProofExperiment& experiment, const ClaimText& text, const Words& words, const ComparedNumber& number);
 void add_errors(ProofExperiment& experiment, const ErrorClaim& claim, const Words& words, double before_v,
                 double after_v);

@@ -8,6 +8,7 @@
 #include "proof/proof.hpp"
 #include "reports/json_results.hpp"
 #include "reports/proof_page.hpp"
+#include "reports/proof_table.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 
@@ -18,6 +19,7 @@ namespace {
 struct ProofOptions {
   std::string data;  ///< folder with a123_26650 and a123_esctoolbox
   std::string only;  ///< one experiment; empty: all
+  std::string table;
   Output output;
 };
 
@@ -84,15 +86,17 @@ class ProofCommand final : public Command {
         ->required()
         ->type_name("DIR");
     c.add_option("--only", o_.only, "run only this experiment")->type_name("NAME");
+    c.add_option("--table", o_.table, "write all claims as a table in Markdown")->type_name("FILE.md");
     add_output(c, o_.output);
     return &c;
   }
 
   int run() override {
-    o_.output.set_own("");
+    o_.output.set_own(o_.table);
     check(o_);
     o_.output.protect(files_in(o_.data));
     const proof::ProofResult result = proof::prove(o_.data, o_.only, progress_on_stderr(0.2, proof_progress));
+    if (!o_.table.empty()) write_output(o_.table, reports::proof_table(result));
     if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(result));
     if (!o_.output.report.empty()) write_output(o_.output.report, reports::proof_report(result));
     print_summary(o_.output, summary(result));

@@ -92,14 +92,14 @@ TEST_F(ProofTool, RefusesMissingRecordingsInOneLine) {
 
 TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
   small_folder();
-  const ToolRun run =
-      run_tool("proof --data " + path("data") + " --json " + path("r.json") + " --report " + path("r.html"));
+  const ToolRun run = run_tool("proof --data " + path("data") + " --json " + path("r.json") + " --report " +
+                               path("r.html") + " --table " + path("r.md"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json r = json::parse(content(path("r.json")));
   EXPECT_EQ(r["command"], "proof");
   std::size_t claims = 0, holding = 0;
   std::set<std::string> ids;
-  const std::string page = content(path("r.html"));
+  const std::string page = content(path("r.html")), table = content(path("r.md"));
   for (const char* name : {"hysteresis", "hysteresis_b", "temperature", "relaxation", "balance", "balance_b", "faults",
                            "no_mismatch", "holdouts"}) {
     const auto at =
@@ -112,6 +112,7 @@ TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
         EXPECT_TRUE(c.contains(key)) << c << key;
       EXPECT_TRUE(ids.insert(c["id"]).second) << c["id"] << " twice";
       EXPECT_THAT(page, HasSubstr(c["claim"].get<std::string>()));
+      EXPECT_THAT(table, HasSubstr("| `" + c["id"].get<std::string>() + "` |"));
       EXPECT_THAT(run.out, HasSubstr(c["claim"].get<std::string>()));
       EXPECT_EQ(c["verdict"] == "fails", !c["holds"].get<bool>());
       EXPECT_THAT(c["id"].get<std::string>(), ::testing::Not(::testing::EndsWith(".run"))) << c["said"];
