@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmark/baselines.hpp"
+#include "benchmark/run_program.hpp"
 #include "benchmark/tables.hpp"
 #include "files/bad_input.hpp"
 #include "files/committed_figures.hpp"
@@ -146,19 +147,5 @@ int main(int argc, char** argv) {
   app.add_option("--readme", o.readme,
                  "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")
       ->type_name("FILE");
-  try {
-    app.parse(argc, argv);
-    run(o);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "benchmark: {} (see --help)\n", error.what());
-    return 2;
-  } catch (const bms::files::BadInput& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "benchmark: {}\n", error.what());
-    return 3;
-  }
+  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
 }

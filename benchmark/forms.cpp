@@ -13,6 +13,7 @@
 #include "benchmark/cause_ids.hpp"
 #include "benchmark/instrument_forms.hpp"
 #include "benchmark/run_case.hpp"
+#include "benchmark/run_program.hpp"
 
 namespace {
 
@@ -85,23 +86,12 @@ void run(const Options& o) {
 
 int main(int argc, char** argv) {
   CLI::App app{"Put errors of real instruments into healthy synthetic recordings, and diagnose them"};
-  app.name("forms");
-  app.footer("Example: forms development 1");
+  app.name("instrument_forms");
+  app.footer("Example: instrument_forms development 1");
   Options o;
   app.add_option("split", o.split, "development or final")->required()->check(CLI::IsMember({"development", "final"}));
   app.add_option("seed", o.seed, "seed of the cases")->required();
   app.add_option("--cells", o.cells, "number of healthy recordings")->capture_default_str();
   app.add_option("--only", o.only, "run only forms whose name contains TEXT")->type_name("TEXT");
-  try {
-    app.parse(argc, argv);
-    run(o);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "forms: {} (see --help)\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "forms: {}\n", error.what());
-    return 3;
-  }
+  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
 }

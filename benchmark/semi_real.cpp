@@ -19,6 +19,7 @@
 #include <CLI/CLI.hpp>
 
 #include "benchmark/injected_faults.hpp"
+#include "benchmark/run_program.hpp"
 #include "benchmark/semi_real_tables.hpp"
 #include "diagnosis/predicted_band.hpp"
 #include "diagnosis/prepare.hpp"
@@ -309,19 +310,5 @@ int main(int argc, char** argv) {
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
   app.add_flag("--bands", o.bands_only, "diagnose nothing: how many readings lie within the band of the prediction");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
-  try {
-    app.parse(argc, argv);
-    run(o);
-    return 0;
-  } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);
-    fmt::print(stderr, "semi_real: {} (see --help)\n", error.what());
-    return 2;
-  } catch (const bms::files::BadInput& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "semi_real: {}\n", error.what());
-    return 3;
-  }
+  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
 }

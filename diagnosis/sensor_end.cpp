@@ -10,8 +10,8 @@
 
 namespace bms::diagnosis {
 
-bool SensorEnd::holds(double current_a) const {
-  return spread_v > 0 && std::abs(current_a) >= (1 - thresholds.facts.stands_within) * limit_a;
+bool SensorEnd::stands(double current_a) const {
+  return std::abs(current_a) >= (1 - thresholds.facts.stands_within) * limit_a;
 }
 
 SensorEnd sensor_end(const PreparedRecording& r, double quiet_a, double noise_v) {
@@ -19,17 +19,14 @@ SensorEnd sensor_end(const PreparedRecording& r, double quiet_a, double noise_v)
   for (const double a : r.current_a) {
     if (std::isfinite(a)) end.limit_a = std::max(end.limit_a, std::abs(a));
   }
-  const auto stands = [&](std::size_t k) {
-    return std::abs(r.current_a[k]) >= (1 - thresholds.facts.stands_within) * end.limit_a;
-  };
   // second differences, without the first row of a visit: under a constant current the voltage relaxes, and bends
   // little
   measurement::MeanSquare bends;
   std::size_t rows = 0;
   for (std::size_t k = 0; k < r.size(); ++k) {
-    const bool same_side = k > 0 && r.current_a[k] * r.current_a[k - 1] > 0;
-    if (!same_side || !stands(k)) rows = 0;
-    if (!stands(k) || ++rows <= thresholds.facts.stands_before) continue;
+    const bool same_side = k > 0 && r.current_a[k] * r.current_a[k - 1] > 0, stands = end.stands(r.current_a[k]);
+    if (!same_side || !stands) rows = 0;
+    if (!stands || ++rows <= thresholds.facts.stands_before) continue;
     const double bend_v = r.voltage_v[k] - 2 * r.voltage_v[k - 1] + r.voltage_v[k - 2];
     if (std::isfinite(bend_v)) bends.add(bend_v);
   }

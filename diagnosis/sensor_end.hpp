@@ -10,8 +10,10 @@ struct SensorEnd {
   double limit_a = 0;   ///< the largest |reading|
   double spread_v = 0;  ///< standard deviation of the voltage from row to row while the reading stands there; 0: it
                         ///< does not stand there, or the voltage does not move either, as at a constant current
+  /// Returns true if the reading stands at its largest value.
+  bool stands(double current_a) const;
   /// Returns true if the reading says no more than "at least this".
-  bool holds(double current_a) const;
+  bool holds(double current_a) const { return spread_v > 0 && stands(current_a); }
 };
 
 /// quiet_a: step of the current below which second differences show the voltage's noise.
