@@ -40,6 +40,15 @@ class PersistentErrorsInSigma {
   static constexpr double temperature_lasts_s = 36'000;
   /// Time in which a polarisation relaxes whose time constant is not known.
   static constexpr double relaxation_lasts_s = 1'800;
+  /// Variance of the resistances, relative, times the samples over which their error lasts in a load of half an hour:
+  /// as long as the model's error.
+  struct LastingLoad {
+    constexpr void add(const arithmetic::Current<S>&, const Fraction&) {}
+    template <class Cell, class Constants>
+    static constexpr const arithmetic::Coupling<S>& resistance_noise(const Cell&, const Constants& constants) {
+      return constants.known_noise();
+    }
+  };
   /// Which square of the overpotential of the last half hour an unknown temperature makes uncertain: the time constants
   /// are unknown as well, so a load and its return do not cancel.
   static constexpr const Variance& past_load_v2(const Variance&, const Variance& mean_square_v2) {
@@ -94,6 +103,28 @@ class PersistentErrorsAsStates {
   static constexpr std::size_t values = 3;  ///< voltage error, current offset, standard deviation of the offset
   /// As long as the model's error, a state that takes up what lasts longer.
   static constexpr double temperature_lasts_s = 0, relaxation_lasts_s = 0;
+  /// The same. The error of the resistances is a function of the SOC (model/mechanisms/temperature_resistance.hpp has
+  /// nodes at 10, 25 and 80 %): a slow charge meets the same error for hours.
+  class LastingLoad {
+   public:
+    /// SOC over which it is one error, and the longest time that one counts: a working day.
+    static constexpr double soc_span = 0.2, longest_s = 36'000;
+
+    /// share: of this check in the mean of half an hour.
+    constexpr void add(const Current& current_a, const Fraction& share) {
+      mean_a_ = Current(mean_a_ + share * Current(current_a - mean_a_));
+    }
+    template <class Cell, class Constants>
+    constexpr arithmetic::Coupling<S> resistance_noise(const Cell& cell, const Constants& constants) const {
+      const auto slowest = Soc(soc_span / longest_s);
+      const Soc per_s = arithmetic::magnitude(Soc(mean_a_ * cell.limits.soc_per_as));
+      const auto lasts_s = arithmetic::ratio<arithmetic::Duration<S>>(Soc(soc_span), per_s > slowest ? per_s : slowest);
+      return arithmetic::product<arithmetic::Coupling<S>>(constants.known_error2(), constants.samples_in(lasts_s));
+    }
+
+   private:
+    Current mean_a_{};
+  };
   static constexpr const Variance& past_load_v2(const Variance& squared_mean_v2, const Variance&) {
     return squared_mean_v2;
   }

@@ -243,7 +243,7 @@ class SocEstimator {
   [[gnu::noinline]] constexpr std::uint32_t check_voltage(const Cell& cell, Current current_a,
                                                           Temperature temperature_c, Soc soc, Voltage above_ocv_v,
                                                           Voltage innovation_v, bool measured) {
-    monitor_.watch(cell, constants_, state_, time_us_, above_ocv_v, innovation_v, measured);
+    monitor_.watch(cell, constants_, state_, time_us_, current_a, above_ocv_v, innovation_v, measured);
     if (!monitor_.has_to_judge(soc, innovation_v)) return 0;
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
     const std::uint32_t found =

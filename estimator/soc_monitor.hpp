@@ -27,6 +27,7 @@ class SocMonitor {
   using State = CellState<S, ModelOf>;
   using StepInput = model::StepInput<S>;
   using Soc = arithmetic::Soc<S>;
+  using Current = arithmetic::Current<S>;
   using Voltage = arithmetic::Voltage<S>;
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
@@ -58,17 +59,21 @@ class SocMonitor {
   /// Updates the means over half an hour. above_ocv_v: predicted voltage above the OCV; measured: the current was.
   template <class Cell, class Constants>
   constexpr void watch(const Cell& cell, const Constants& constants, const State& state, std::uint64_t time_us,
-                       const Voltage& above_ocv_v, const Voltage& innovation_v, bool measured) {
+                       const Current& current_a, const Voltage& above_ocv_v, const Voltage& innovation_v,
+                       bool measured) {
     const std::uint64_t since_us = consistency_.begin(time_us, bank_.open());
     if (since_us == 0) return;
     share_ = Consistency<S>::share_of(arithmetic::seconds<S>(Constants::capped(since_us)));
-    if (measured)
+    if (measured) {
       consistency_.add(Errors::with_error(state, innovation_v), Errors::without_error(state, above_ocv_v), share_);
+      load_.add(current_a, share_);
+    }
     const Variance mean_v2 = consistency_.overpotential_v2(),
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
-    reading_noise_v2_ = Variance(
-        cell.noise.voltage_v2 + Variance(arithmetic::product<Variance>(mean_v2, constants.known_noise()) +
-                                         arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
+    reading_noise_v2_ =
+        Variance(cell.noise.voltage_v2 +
+                 Variance(arithmetic::product<Variance>(mean_v2, load_.resistance_noise(cell, constants)) +
+                          arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
   }
 
   constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {
@@ -173,6 +178,7 @@ class SocMonitor {
 
   Consistency<S> consistency_;
   Variance reading_noise_v2_{};
+  [[no_unique_address]] typename Errors::LastingLoad load_;
   Fraction share_{};  ///< of the last check in the means
   AmbiguousSoc<S, ModelOf> bank_;
   bool contradicted_ = false;

@@ -86,6 +86,12 @@ class StepConstants {
     update_resistance_noise();
   }
 
+  /// Samples in a time, or in the correlation time of the model's error if that is longer.
+  constexpr Count samples_in(const Duration& time_s) const {
+    const auto count = arithmetic::ratio<Count>(time_s, duration_s_);
+    return count > correlated_samples_ ? count : correlated_samples_;
+  }
+
   /// SOC by which the charge of a step may be wrong when the current was not measured: an unknown current flowed, and
   /// the current that was counted instead may have ended. 1 at most.
   template <class Cell>
@@ -117,12 +123,6 @@ class StepConstants {
     resistance_noise_ = Coupling(known_noise_ + by_temperature);
     relaxing_noise_ =
         arithmetic::product<Coupling>(temperature_error2_, samples_in(Duration(Errors::relaxation_lasts_s)));
-  }
-
-  /// Samples in a time, or in the correlation time of the model's error if that is longer.
-  constexpr Count samples_in(const Duration& time_s) const {
-    const auto count = arithmetic::ratio<Count>(time_s, duration_s_);
-    return count > correlated_samples_ ? count : correlated_samples_;
   }
 
   /// Sum over the step of a rate per second, 1 at most.

@@ -6,6 +6,7 @@
 
 #include <gtest/gtest.h>
 
+#include "files/recording.hpp"
 #include "images/emulator.hpp"
 #include "tests/figures/soc_trials.hpp"
 
@@ -23,6 +24,30 @@ double largest_rmse(const std::string& name, bool balanced) {
   if (!balanced) return name.starts_with("dyn") ? 0.02 : 0.01;
   if (name == "dyn50_P25") return 0.010;
   return name == "dyn45_P05" ? 0.015 : 0.020;
+}
+
+/// A slow charge or discharge of each shared temperature. In the cold the resistances of the drives are twice those of
+/// so small a current, and each half hour shows the same error again.
+TEST(SocTrials, SlowRunsAreInsideTwoSigma) {
+  if (!there()) GTEST_SKIP() << "the real recordings are not there: " << data;
+  std::size_t runs = 0;
+  for (const char* set : {"a123_26650", "a123_esctoolbox"}) {
+    const files::CellFile cell = files::read_cell(std::string(set) + "_extended");
+    for (const auto& entry : std::filesystem::directory_iterator(data / set)) {
+      if (!entry.path().stem().string().starts_with("ocv_") || entry.path().extension() != ".csv") continue;
+      SCOPED_TRACE(entry.path());
+      ++runs;
+      host_sim::ReplayResult r;
+      r.cell = cell;
+      r.recording = files::read_recording(entry.path().string());
+      r.track =
+          host_sim::run_on_host(r.cell, measurement::samples(r.recording), host_sim::starting_point({}), r.scalar);
+      host_sim::evaluate(r);
+      EXPECT_GE(*r.soc.within_2_sigma, 0.9);
+      EXPECT_LT(*r.soc.rmse, 0.06);
+    }
+  }
+  EXPECT_EQ(runs, 22U);
 }
 
 TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {

@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "estimator/step_constants.hpp"
 #include "model/extended_rc.hpp"
 #include "tests/cells.hpp"
 
@@ -38,6 +39,27 @@ TEST(PersistentErrors, AsStatesAQuarterOfTheModelsVarianceStaysNoiseAndTheAxisCo
   const auto axis = [] { return 4e-6; };
   EXPECT_EQ(InSigma::error_in_noise(noise, 9e-6, axis), 9e-6);
   EXPECT_EQ(AsStates::error_in_noise(noise, 9e-6, axis), noise.model_v2 / 4 + 8 * 4e-6);
+}
+
+/// As long as 20 % of charge take, at most a working day, and at least as long as the model's error.
+TEST(PersistentErrors, AsStatesTheErrorOfTheResistancesLastsAsLongAsTheSocStaysNearby) {
+  const auto cell = tests::prepared<double>();
+  StepConstants<double, WithErrors<double>, AsStates> constants;
+  constants.set_time_step(cell.noise, 10'000'000);
+  constants.set_temperature(cell, 2'500);
+  const double capacity_ah = 1 / (3'600 * cell.limits.soc_per_as);
+  const auto lasts_s = [&](double c_rate) {
+    AsStates::LastingLoad load;
+    load.add(-c_rate * capacity_ah, 1);
+    return 10 * load.resistance_noise(cell, constants) / constants.known_error2();
+  };
+  EXPECT_NEAR(lasts_s(0.05), 0.2 / 0.05 * 3'600, 1e-6);
+  EXPECT_NEAR(lasts_s(0), 36'000, 1e-6);
+  EXPECT_NEAR(lasts_s(50), 10 * constants.correlated_samples(), 1e-6);
+  StepConstants<double, Plain<double>, InSigma> plain;
+  plain.set_time_step(cell.noise, 10'000'000);
+  plain.set_temperature(cell, 2'500);
+  EXPECT_EQ(InSigma::LastingLoad::resistance_noise(cell, plain), plain.known_noise());
 }
 
 TEST(PersistentErrors, AGainErrorGrowsWithTheCountedChargeAndStaysWhenItComesBack) {

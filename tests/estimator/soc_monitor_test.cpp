@@ -21,7 +21,7 @@ std::uint32_t flags_at(double soc, double sigma) {
   state.covariance.set_diagonal({1e-8, sigma * sigma});
   SocMonitor<double, Model> monitor;
   monitor.start(cell);
-  monitor.watch(cell, constants, state, 1'000'000, 0, 0, true);
+  monitor.watch(cell, constants, state, 1'000'000, 0, 0, 0, true);
   if (!monitor.has_to_judge(soc, 0)) return 0;
   return monitor.judge(cell, {0, 1, 25}, constants, soc, 0, monitor.resistance_error_v2(constants, 0, state), 0, state);
 }
