@@ -40,13 +40,13 @@ class PersistentErrorsInSigma {
   static constexpr double temperature_lasts_s = 36'000;
   /// Time in which a polarisation relaxes whose time constant is not known.
   static constexpr double relaxation_lasts_s = 1'800;
-  /// Variance of the resistances, relative, times the samples over which their error lasts in a load of half an hour:
-  /// as long as the model's error.
+  /// Variance of a voltage by the error of the resistances under a load of half an hour: lasts as long as the model's.
   struct LastingLoad {
     constexpr void add(const arithmetic::Current<S>&, const Fraction&) {}
+    /// mean_v2: square of the mean overpotential.
     template <class Cell, class Constants>
-    static constexpr const arithmetic::Coupling<S>& resistance_noise(const Cell&, const Constants& constants) {
-      return constants.known_noise();
+    static constexpr Variance noise_v2(const Variance& mean_v2, const Cell&, const Constants& constants) {
+      return arithmetic::product<Variance>(mean_v2, constants.known_noise());
     }
   };
   /// Which square of the overpotential of the last half hour an unknown temperature makes uncertain: the time constants
@@ -104,7 +104,8 @@ class PersistentErrorsAsStates {
   /// As long as the model's error, a state that takes up what lasts longer.
   static constexpr double temperature_lasts_s = 0, relaxation_lasts_s = 0;
   /// The same. The error of the resistances is a function of the SOC (model/mechanisms/temperature_resistance.hpp has
-  /// nodes at 10, 25 and 80 %): a slow charge meets the same error for hours.
+  /// nodes at 10, 25 and 80 %): a slow charge meets the same error for hours. What the voltage error that is a state
+  /// can take up counts once in the time of the model's error, what is more once while the SOC stays nearby.
   class LastingLoad {
    public:
     /// SOC over which it is one error, and the longest time that one counts: a working day.
@@ -115,11 +116,16 @@ class PersistentErrorsAsStates {
       mean_a_ = Current(mean_a_ + share * Current(current_a - mean_a_));
     }
     template <class Cell, class Constants>
-    constexpr arithmetic::Coupling<S> resistance_noise(const Cell& cell, const Constants& constants) const {
+    constexpr Variance noise_v2(const Variance& mean_v2, const Cell& cell, const Constants& constants) const {
+      const auto error_v2 = arithmetic::product<Variance>(mean_v2, constants.known_error2());
+      const auto in_state_v2 = arithmetic::product<Variance>(cell.noise.model_v2, Fraction(1 - uncorrelated_share));
+      const auto once_v2 = arithmetic::product<Variance>(error_v2, constants.correlated_samples());
+      if (!(error_v2 > in_state_v2)) return once_v2;
       const auto slowest = Soc(soc_span / longest_s);
       const Soc per_s = arithmetic::magnitude(Soc(mean_a_ * cell.limits.soc_per_as));
       const auto lasts_s = arithmetic::ratio<arithmetic::Duration<S>>(Soc(soc_span), per_s > slowest ? per_s : slowest);
-      return arithmetic::product<arithmetic::Coupling<S>>(constants.known_error2(), constants.samples_in(lasts_s));
+      const auto more = Count(constants.samples_in(lasts_s) - constants.correlated_samples());
+      return Variance(once_v2 + arithmetic::product<Variance>(Variance(error_v2 - in_state_v2), more));
     }
 
    private:

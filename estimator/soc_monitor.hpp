@@ -70,10 +70,9 @@ class SocMonitor {
     }
     const Variance mean_v2 = consistency_.overpotential_v2(),
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
-    reading_noise_v2_ =
-        Variance(cell.noise.voltage_v2 +
-                 Variance(arithmetic::product<Variance>(mean_v2, load_.resistance_noise(cell, constants)) +
-                          arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
+    reading_noise_v2_ = Variance(
+        cell.noise.voltage_v2 + Variance(load_.noise_v2(mean_v2, cell, constants) +
+                                         arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
   }
 
   constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {

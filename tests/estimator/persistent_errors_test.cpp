@@ -42,24 +42,30 @@ TEST(PersistentErrors, AsStatesAQuarterOfTheModelsVarianceStaysNoiseAndTheAxisCo
 }
 
 /// As long as 20 % of charge take, at most a working day, and at least as long as the model's error.
-TEST(PersistentErrors, AsStatesTheErrorOfTheResistancesLastsAsLongAsTheSocStaysNearby) {
+TEST(PersistentErrors, AsStatesALargeErrorOfTheResistancesLastsAsLongAsTheSocStaysNearby) {
   const auto cell = tests::prepared<double>();
   StepConstants<double, WithErrors<double>, AsStates> constants;
   constants.set_time_step(cell.noise, 10'000'000);
   constants.set_temperature(cell, 2'500);
-  const double capacity_ah = 1 / (3'600 * cell.limits.soc_per_as);
-  const auto lasts_s = [&](double c_rate) {
+  const double capacity_ah = 1 / (3'600 * cell.limits.soc_per_as), in_state_v2 = 0.75 * cell.noise.model_v2,
+               once_s = 10 * constants.correlated_samples(), error_v2 = 5 * in_state_v2;
+  const auto noise_v2 = [&](double c_rate, double of_resistances_v2) {
     AsStates::LastingLoad load;
     load.add(-c_rate * capacity_ah, 1);
-    return 10 * load.resistance_noise(cell, constants) / constants.known_error2();
+    return load.noise_v2(of_resistances_v2 / constants.known_error2(), cell, constants);
+  };
+  const auto lasts_s = [&](double c_rate) {
+    return 10 * (noise_v2(c_rate, error_v2) - in_state_v2 * once_s / 10) / (error_v2 - in_state_v2);
   };
   EXPECT_NEAR(lasts_s(0.05), 0.2 / 0.05 * 3'600, 1e-6);
   EXPECT_NEAR(lasts_s(0), 36'000, 1e-6);
-  EXPECT_NEAR(lasts_s(50), 10 * constants.correlated_samples(), 1e-6);
+  EXPECT_NEAR(lasts_s(50), once_s, 1e-6);
+  // the state of the voltage error can take it up
+  EXPECT_DOUBLE_EQ(noise_v2(0.05, in_state_v2 / 2), in_state_v2 / 2 * once_s / 10);
   StepConstants<double, Plain<double>, InSigma> plain;
   plain.set_time_step(cell.noise, 10'000'000);
   plain.set_temperature(cell, 2'500);
-  EXPECT_EQ(InSigma::LastingLoad::resistance_noise(cell, plain), plain.known_noise());
+  EXPECT_EQ(InSigma::LastingLoad::noise_v2(1e-4, cell, plain), 1e-4 * plain.known_noise());
 }
 
 TEST(PersistentErrors, AGainErrorGrowsWithTheCountedChargeAndStaysWhenItComesBack) {
