@@ -146,7 +146,7 @@ Prepared prepare(const Options& o, const RealSet& set) {
 
 /// The band of the prediction on the recording that is left out.
 struct Band {
-  double within = 0;  ///< share of the readings within 1.96 standard deviations
+  double within = 0;                     ///< share of the readings within 1.96 standard deviations
   double error_v = 0, half_width_v = 0;  ///< RMS
 };
 
@@ -154,8 +154,8 @@ Band band_of(const RealSet& set, const Prepared& p) {
   const bms::diagnosis::PreparedRecording record =
       bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
   const bms::diagnosis::LikelihoodModel likelihood =
-      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record}, p.cell.healthy.regimes);
-  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy.regimes),
+      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record});
+  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy),
                             file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
   std::size_t within = 0, of = 0;
   bms::measurement::MeanSquare error, band;

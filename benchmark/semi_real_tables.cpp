@@ -77,8 +77,8 @@ std::string by_cell(const std::vector<Result>& results) {
     for (const Result& r : results) hours += null(r) ? r.hours : 0;
     const auto of = std::find_if(results.begin(), results.end(), null);
     const bool held_out = of != results.end() && of->held_out;
-    text += fmt::format("| {}{} | {:.1f} | {} | {} | {} | {} | {} | {} |\n", cell, held_out ? "" : " (development)", hours,
-                        share(results, null, [](const Result& r) { return r.named; }),
+    text += fmt::format("| {}{} | {:.1f} | {} | {} | {} | {} | {} | {} |\n", cell, held_out ? "" : " (development)",
+                        hours, share(results, null, [](const Result& r) { return r.named; }),
                         share(results, fault, [](const Result& r) { return r.detected; }),
                         share(results, fault, [](const Result& r) { return r.first_right; }),
                         share(results, fault, [](const Result& r) { return r.named && !r.first_right; }),
