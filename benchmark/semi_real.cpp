@@ -121,32 +121,41 @@ Prepared prepare(const Options& o, const RealSet& set) {
   options.ocv_from_load = set.ocv_from_load;
   if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
   Prepared p;
-  const std::filesystem::path half = std::filesystem::temp_directory_path() / "semi_real_calibration.csv";
+  const std::filesystem::path folder = std::filesystem::temp_directory_path();
+  std::string test = path(set.test);
   if (set.test.empty()) {
     const Recording whole = bms::files::read_recording(path(set.calibration.front()));
-    bms::files::write_file(half.string(), csv_of(part(whole, 0, whole.rows() / 2)));
-    options.recordings = {half.string()};
-    p.test = part(whole, whole.rows() / 2, whole.rows());
+    const auto save = [&](const char* name, std::size_t first, std::size_t end) {
+      bms::files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
+      return (folder / name).string();
+    };
+    options.recordings = {save("semi_real_calibration.csv", 0, whole.rows() / 2)};
+    test = save("semi_real_test.csv", whole.rows() / 2, whole.rows());
   } else {
     for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
-    p.test = bms::files::read_recording(path(set.test));
   }
   for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
   if (set.healthy.empty()) options.healthy = options.recordings;
   if (o.without_healthy) options.healthy.clear();
   options.name = "calibrated";
   p.cell = *bms::workflow::identify_cell(options).cell_file;
-  std::filesystem::remove(half);
+  p.test = bms::workflow::read_for_diagnosis(test, {}, p.cell);
+  for (const char* name : {"semi_real_calibration.csv", "semi_real_test.csv"}) std::filesystem::remove(folder / name);
   return p;
 }
 
-/// Of the recording that is left out: how many readings lie within 1.96 standard deviations of the prediction.
-void print_band(const RealSet& set, const Prepared& p) {
+/// The band of the prediction on the recording that is left out.
+struct Band {
+  double within = 0;                     ///< share of the readings within 1.96 standard deviations
+  double error_v = 0, half_width_v = 0;  ///< RMS
+};
+
+Band band_of(const RealSet& set, const Prepared& p) {
   const bms::diagnosis::PreparedRecording record =
       bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
   const bms::diagnosis::LikelihoodModel likelihood =
-      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record}, p.cell.healthy.regimes);
-  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy.regimes),
+      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record});
+  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy),
                             file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
   std::size_t within = 0, of = 0;
   bms::measurement::MeanSquare error, band;
@@ -159,9 +168,12 @@ void print_band(const RealSet& set, const Prepared& p) {
     error.add(e);
     band.add(two_sided_95 * sigma_v[k]);
   }
-  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name,
-             100 * static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(of, 1)), 1e3 * error.root(),
-             1e3 * band.root());
+  return {static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(of, 1)), error.root(), band.root()};
+}
+
+void print_band(const RealSet& set, const Band& band) {
+  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name, 100 * band.within,
+             1e3 * band.error_v, 1e3 * band.half_width_v);
   std::fflush(stdout);
 }
 
@@ -269,12 +281,16 @@ void run(const Options& o) {
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
       continue;
     }
+    const Band band = band_of(set, p);
     if (o.bands_only) {
-      print_band(set, p);
+      print_band(set, band);
       continue;
     }
     std::map<std::string, double> limits;
-    add(diagnose(o, set, p, p.test, nullptr, 0, limits));
+    Result null = diagnose(o, set, p, p.test, nullptr, 0, limits);
+    null.band_within = band.within;
+    null.band_over_error = band.half_width_v / band.error_v;
+    add(std::move(null));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
       if (!wanted(fault.id)) continue;

@@ -9,6 +9,8 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "measurement/statistics.hpp"
+
 namespace bms::benchmark {
 
 namespace {
@@ -37,11 +39,29 @@ std::string hours_of(const std::vector<Result>& results, bool held_out) {
   return fmt::format("{:.1f} h", hours);
 }
 
+nlohmann::ordered_json or_null(const std::optional<double>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+/// "94.1 %, 2.1 times": readings within the band, mean of the nulls; the band's half width over the error, median.
+std::string bands_of(const std::vector<Result>& results, const Which& counts) {
+  double sum = 0;
+  std::vector<double> widths;
+  for (const Result& r : results) {
+    if (!counts(r) || !r.band_within) continue;
+    sum += *r.band_within;
+    widths.push_back(*r.band_over_error);
+  }
+  if (widths.empty()) return "-";
+  return fmt::format("{:.1f} %, {:.2g} times", 100 * sum / static_cast<double>(widths.size()),
+                     measurement::median(widths));
+}
+
 /// The same figures for each cell. Faults are those of twice their detection limit and above.
 std::string by_cell(const std::vector<Result>& results) {
   std::string text =
-      "\n| cell | hours | nulls named | faults detected | named first | another name first | size within two sigma |\n"
-      "|---|---|---|---|---|---|---|\n";
+      "\n| cell | hours | nulls named | faults detected | named first | another name first | size within two sigma | "
+      "band |\n|---|---|---|---|---|---|---|---|\n";
   std::vector<std::string> cells;
   for (const Result& r : results) {
     if (std::find(cells.begin(), cells.end(), r.cell) == cells.end()) cells.push_back(r.cell);
@@ -57,12 +77,13 @@ std::string by_cell(const std::vector<Result>& results) {
     for (const Result& r : results) hours += null(r) ? r.hours : 0;
     const auto of = std::find_if(results.begin(), results.end(), null);
     const bool held_out = of != results.end() && of->held_out;
-    text += fmt::format("| {}{} | {:.1f} | {} | {} | {} | {} | {} |\n", cell, held_out ? "" : " (development)", hours,
-                        share(results, null, [](const Result& r) { return r.named; }),
+    text += fmt::format("| {}{} | {:.1f} | {} | {} | {} | {} | {} | {} |\n", cell, held_out ? "" : " (development)",
+                        hours, share(results, null, [](const Result& r) { return r.named; }),
                         share(results, fault, [](const Result& r) { return r.detected; }),
                         share(results, fault, [](const Result& r) { return r.first_right; }),
                         share(results, fault, [](const Result& r) { return r.named && !r.first_right; }),
-                        share(results, sized, [](const Result& r) { return std::abs(*r.sigmas) <= 2; }));
+                        share(results, sized, [](const Result& r) { return std::abs(*r.sigmas) <= 2; }),
+                        bands_of(results, null));
   }
   return text;
 }
@@ -107,7 +128,10 @@ std::string table_of(const std::vector<Result>& results) {
   row(
       "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
       [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
-  text += by_cell(results);
+  text += "| readings within the 95 % band; its half width over the error |";
+  for (const bool held_out : {false, true})
+    text += " " + bands_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
+  text += "\n" + by_cell(results);
   double slowest_s = 0;
   for (const Result& r : results) slowest_s = std::max(slowest_s, r.wall_s);
   return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
@@ -124,9 +148,11 @@ std::string json_of(const std::vector<Result>& results) {
                     {"verdict", r.verdict},
                     {"found", r.found},
                     {"withheld", r.withheld},
-                    {"over_limit", r.over_limit ? nlohmann::ordered_json(*r.over_limit) : nlohmann::ordered_json()},
+                    {"over_limit", or_null(r.over_limit)},
                     {"first_right", r.first_right},
-                    {"sigmas", r.sigmas ? nlohmann::ordered_json(*r.sigmas) : nlohmann::ordered_json()},
+                    {"sigmas", or_null(r.sigmas)},
+                    {"band_within", or_null(r.band_within)},
+                    {"band_over_error", or_null(r.band_over_error)},
                     {"error_v", r.error_v},
                     {"remaining_v", r.remaining_v},
                     {"wall_s", r.wall_s}});
@@ -135,10 +161,13 @@ std::string json_of(const std::vector<Result>& results) {
 }
 
 std::string line_of(const SemiRealResult& r) {
-  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}\n", r.set,
+  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}{}\n", r.set,
                      r.fault.empty() ? "(healthy)" : r.fault, r.size,
                      r.over_limit ? fmt::format("{:.2g} L", *r.over_limit) : "-", r.verdict, 1e3 * r.error_v,
-                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld);
+                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld,
+                     r.band_within ? fmt::format(" | band {:.1f} %, {:.2g} times the error", 100 * *r.band_within,
+                                                 r.band_over_error.value_or(0))
+                                   : "");
 }
 
 }  // namespace bms::benchmark

@@ -14,8 +14,10 @@ struct SemiRealResult {
   double size = 0;
   std::string verdict, found, withheld;
   bool detected = false, first_right = false, named = false;
-  std::optional<double> over_limit;  ///< size over the stated detection limit
-  std::optional<double> sigmas;      ///< of the found size from the true one
+  std::optional<double> over_limit;       ///< size over the stated detection limit
+  std::optional<double> sigmas;           ///< of the found size from the true one
+  std::optional<double> band_within;      ///< of a null: share of the readings within the 95 % band of the prediction
+  std::optional<double> band_over_error;  ///< of a null: RMS of the band's half width over that of the error
   double error_v = 0, remaining_v = 0, wall_s = 0, hours = 0;
 };
 

@@ -26,6 +26,18 @@ bool contains(const std::vector<std::size_t>& list, std::size_t m) {
   return std::find(list.begin(), list.end(), m) != list.end();
 }
 
+/// The reading in rests: an offset of the sensor moves it, and the reading of the load to the other side. 0 if there is
+/// no rest.
+double rest_reading_a(const std::vector<PreparedRecording>& records, double largest_a) {
+  std::vector<double> small_a;
+  for (const PreparedRecording& r : records) {
+    for (const double a : r.current_a) {
+      if (std::abs(a) < rest_at_one_current * largest_a) small_a.push_back(a);
+    }
+  }
+  return small_a.empty() ? 0 : measurement::upper_median(small_a);
+}
+
 }  // namespace
 
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
@@ -33,12 +45,13 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double capac
   for (const PreparedRecording& r : records) {
     for (const double a : r.current_a) largest_a = std::isfinite(a) ? std::max(largest_a, std::abs(a)) : largest_a;
   }
+  const double rest_a = rest_reading_a(records, largest_a);
   std::vector<double> loaded_a;
   std::size_t edges = 0;
   for (const PreparedRecording& r : records) {
     for (std::size_t k = 0; k < r.size(); ++k) {
       const double a = r.current_a[k];
-      if (std::abs(a) > loaded_at_one_current * largest_a) loaded_a.push_back(a);
+      if (std::abs(a - rest_a) > loaded_at_one_current * largest_a) loaded_a.push_back(a);
       if (k > 0 && std::abs(a - r.current_a[k - 1]) > current_limits.edge_c * capacity_ah) ++edges;
     }
   }

@@ -13,9 +13,12 @@
 
 namespace bms::diagnosis {
 
-/// Of the largest current, above which a row is loaded here: an offset of the sensor makes every rest look like a small
-/// load, and must not hide that there is one current.
+/// Of the largest current, by which a loaded row differs here from the reading in rests.
 inline constexpr double loaded_at_one_current = 0.3;
+
+/// Of the largest current, below which a reading may be that of a rest. An offset of a third of the load reads half as
+/// much in a rest as under load.
+inline constexpr double rest_at_one_current = 0.5;
 
 /// Returns true if nearly all load has one current in one direction, switched on or off only a few times.
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);

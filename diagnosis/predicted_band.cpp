@@ -1,8 +1,6 @@
 #include "diagnosis/predicted_band.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "diagnosis/thresholds.hpp"
 
@@ -10,25 +8,30 @@ namespace bms::diagnosis {
 
 namespace {
 
-/// Error of healthy recordings [V] at the nearest state of charge at which there were any; 0 without them.
-double healthy_error_v(const std::vector<measurement::HealthyRegime>& regimes, double soc) {
-  double nearest = std::numeric_limits<double>::infinity(), rms_v = 0;
+/// The error of healthy recordings at a state of charge; nullptr if none was there.
+const measurement::HealthyRegime* regime_at(const std::vector<measurement::HealthyRegime>& regimes, double soc) {
   for (const measurement::HealthyRegime& r : regimes) {
-    const double away = std::max({r.from - soc, soc - r.to, 0.0});
-    if (r.axis != "soc" || !(r.hours > 0) || away >= nearest) continue;
-    nearest = away;
-    rms_v = r.rms_v;
+    // the outermost ranges have no outer end
+    const bool from = soc >= r.from || r.from <= 0, to = soc < r.to || r.to >= 1;
+    if (r.axis == "soc" && r.hours > 0 && from && to) return &r;
   }
-  return thresholds.healthy.error_times * rms_v;
+  return nullptr;
 }
 
-}  // namespace
+/// Returns true if the current goes beyond that of the healthy recordings.
+bool is_beyond(const PreparedRecording& record, const std::vector<measurement::HealthyBlock>& blocks) {
+  measurement::HealthyRange here, healthy;
+  for (const double a : record.current_a) here.add(std::abs(a));
+  for (const measurement::HealthyBlock& b : blocks) {
+    healthy.add(std::abs(b.current_a.low));
+    healthy.add(std::abs(b.current_a.high));
+  }
+  return healthy.known() && here.high > thresholds.healthy.current_beyond * healthy.high;
+}
 
-std::vector<double> predicted_sigma_v(const LikelihoodModel& likelihood, std::size_t record,
-                                      const std::vector<measurement::HealthyRegime>& regimes) {
-  const Hypothesis base = likelihood.base();
-  std::vector<double> soc;
-  const std::vector<double> file_v = likelihood.voltage(base, likelihood.unchanged(), record, &soc);
+/// By the cell file alone [V^2]: noise, and the base parameters within their tolerance.
+std::vector<double> expected_v2(const LikelihoodModel& likelihood, std::size_t record,
+                                const std::vector<double>& file_v) {
   const NoiseModel& noise = likelihood.noise();
   const RowNoise& rows = likelihood.row_noise(record);
   std::vector<double> variance_v2(file_v.size());
@@ -38,12 +41,32 @@ std::vector<double> predicted_sigma_v(const LikelihoodModel& likelihood, std::si
   for (std::size_t j = 0; j < likelihood.calibration().size(); ++j) {
     Eigen::VectorXd moved = likelihood.unchanged();
     moved[static_cast<Eigen::Index>(j)] = 1;  // in standard deviations
-    const std::vector<double> moved_v = likelihood.voltage(base, moved, record);
+    const std::vector<double> moved_v = likelihood.voltage(likelihood.base(), moved, record);
     for (std::size_t k = 0; k < file_v.size(); ++k) variance_v2[k] += std::pow(moved_v[k] - file_v[k], 2);
   }
+  return variance_v2;
+}
+
+}  // namespace
+
+std::vector<double> predicted_sigma_v(const LikelihoodModel& likelihood, std::size_t record,
+                                      const measurement::HealthyData& healthy) {
+  constexpr const Thresholds::Healthy& limits = thresholds.healthy;
+  std::vector<double> soc;
+  const std::vector<double> file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), record, &soc),
+                            variance_v2 = expected_v2(likelihood, record, file_v);
+  const bool beyond = is_beyond(likelihood.records()[record], healthy.blocks);
   std::vector<double> sigma_v;
-  for (std::size_t k = 0; k < file_v.size(); ++k)
-    sigma_v.push_back(std::max(std::sqrt(variance_v2[k]), healthy_error_v(regimes, soc[k])));
+  for (std::size_t k = 0; k < file_v.size(); ++k) {
+    const measurement::HealthyRegime* there = beyond ? nullptr : regime_at(healthy.regimes, soc[k]);
+    double v2 = variance_v2[k];
+    if (there != nullptr)
+      v2 = (limits.tolerance_counts * v2 + there->parts * there->high_v * there->high_v) /
+           (limits.tolerance_counts + there->parts);
+    else if (!healthy.regimes.empty())
+      v2 = std::pow(limits.tolerance_beyond, 2) * v2 + std::pow(healthy.beyond_tolerance_v, 2);
+    sigma_v.push_back(std::sqrt(v2));
+  }
   return sigma_v;
 }
 

@@ -56,6 +56,8 @@ HealthyRegime read_regime(TomlTable& table) {
   r.bias_v = table.number("bias_v");
   r.rms_v = not_negative(table, "rms_v");
   r.spread_v = not_negative(table, "spread_v");
+  if (table.has("parts")) r.parts = not_negative(table, "parts");
+  r.high_v = table.has("high_v") ? not_negative(table, "high_v") : r.rms_v;
   table.finish();
   return r;
 }
@@ -81,7 +83,8 @@ std::string block_text(const HealthyBlock& b) {
 
 std::string regime_text(const HealthyRegime& r) {
   return "\n[[healthy.regime]]\naxis = " + quoted(r.axis) + "\n" + line("from", r.from) + line("to", r.to) +
-         line("hours", r.hours) + line("bias_v", r.bias_v) + line("rms_v", r.rms_v) + line("spread_v", r.spread_v);
+         line("hours", r.hours) + line("bias_v", r.bias_v) + line("rms_v", r.rms_v) + line("spread_v", r.spread_v) +
+         line("parts", r.parts) + line("high_v", r.high_v);
 }
 
 }  // namespace
@@ -91,13 +94,15 @@ measurement::HealthyData read_healthy(TomlTable& healthy) {
   data.known = true;
   for (TomlTable& block : healthy.tables("block")) data.blocks.push_back(read_block(block));
   for (TomlTable& regime : healthy.tables("regime")) data.regimes.push_back(read_regime(regime));
+  if (healthy.has("beyond_tolerance_v")) data.beyond_tolerance_v = not_negative(healthy, "beyond_tolerance_v");
   healthy.finish();
   return data;
 }
 
 std::string healthy_text(const measurement::HealthyData& healthy, const std::string& source) {
   if (!healthy.known) return "";
-  std::string text = "\n[healthy]\nsource = " + quoted(source) + "\n";
+  std::string text =
+      "\n[healthy]\nsource = " + quoted(source) + "\n" + line("beyond_tolerance_v", healthy.beyond_tolerance_v);
   for (const HealthyBlock& b : healthy.blocks) text += block_text(b);
   for (const HealthyRegime& r : healthy.regimes) text += regime_text(r);
   return text;

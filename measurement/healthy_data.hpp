@@ -51,12 +51,16 @@ struct HealthyRegime {
   double bias_v = 0;  ///< mean
   double rms_v = 0;
   double spread_v = 0;  ///< standard deviation of the blocks' means
+  double parts = 1;     ///< recordings that were there; of a single recording, its blocks
+  double high_v = 0;    ///< RMS, with the standard deviation of the parts' mean squares added to their mean
 };
 
 struct HealthyData {
   bool known = false;  ///< healthy recordings were given, even if no block of them could be diagnosed
   std::vector<HealthyBlock> blocks;
   std::vector<HealthyRegime> regimes;
+  /// RMS of the error [V] that the noise and the tolerance of the cell file do not explain.
+  double beyond_tolerance_v = 0;
 
   double hours() const {
     double sum_s = 0;

@@ -8,6 +8,8 @@
 #include <fmt/format.h>
 
 #include "diagnosis/healthy_block.hpp"
+#include "diagnosis/predicted_band.hpp"
+#include "diagnosis/prepare.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "files/bad_input.hpp"
 #include "workflow/diagnose_recordings.hpp"
@@ -108,9 +110,12 @@ class Learning {
     std::vector<char> usable;
     for (std::size_t b = 0; b < blocks_.size(); ++b) usable.push_back(diagnose(b) ? 1 : 0);
     data_.known = true;
-    if (!data_.blocks.empty()) data_.regimes = regimes_.regimes(usable);
+    if (!data_.blocks.empty()) {
+      data_.regimes = regimes_.regimes(usable);
+      data_.beyond_tolerance_v = in_short(regimes_.beyond_tolerance_v(usable));
+    }
     for (measurement::HealthyRegime& r : data_.regimes) {
-      for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v}) *v = in_short(*v);
+      for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v, &r.high_v}) *v = in_short(*v);
     }
     return std::move(data_);
   }
@@ -169,8 +174,9 @@ class Learning {
     Block block{n, prepared(std::move(recording), name, cell, start).record, cell};
     diagnosis::PreparedRecording checked = block.record;
     diagnosis::check_recording(checked, cell.parameters);  // removes bad readings
-    regimes_.add_block(checked, diagnosis::predict(cell.parameters, cell.mechanisms, checked),
-                       cell.parameters.capacity_ah);
+    const auto likelihood = diagnosis::likelihood_model_of(cell.parameters, cell.mechanisms, {checked});
+    regimes_.add_block(n, checked, diagnosis::predict(cell.parameters, cell.mechanisms, checked),
+                       diagnosis::predicted_sigma_v(likelihood, 0), cell.parameters.capacity_ah);
     blocks_.push_back(std::move(block));
   }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "diagnosis/charge_count.hpp"
+#include "diagnosis/thresholds.hpp"
 
 namespace bms::workflow {
 
@@ -36,21 +37,32 @@ std::size_t range_of(const std::vector<double>& edges, double value) {
 
 }  // namespace
 
-void ResidualRegimes::add_block(const diagnosis::PreparedRecording& record, const std::vector<double>& simulated_v,
+std::size_t ResidualRegimes::part_of(std::size_t block) const {
+  const bool single = std::all_of(blocks_.begin(), blocks_.end(),
+                                  [&](const Block& b) { return b.recording == blocks_.front().recording; });
+  return single ? block : blocks_[block].recording;
+}
+
+void ResidualRegimes::add_block(std::size_t recording, const diagnosis::PreparedRecording& record,
+                                const std::vector<double>& simulated_v, const std::vector<double>& expected_v,
                                 double capacity_ah) {
-  auto& block = blocks_.emplace_back();
+  Block& block = blocks_.emplace_back();
+  block.recording = recording;
   double last_edge_s = record.time_s.front();
   diagnosis::for_each_row(record, capacity_ah, [&](const diagnosis::CountedRow& row) {
     const double now_s = record.time_s[row.k];
     if (std::abs(row.current_a - row.previous_a) > edge_c * capacity_ah) last_edge_s = now_s;
     const double residual_v = record.voltage_v[row.k] - simulated_v[row.k];
     if (!std::isfinite(residual_v)) return;
+    ++block.rows;
+    block.squares += residual_v * residual_v;
+    block.expected += expected_v[row.k] * expected_v[row.k];
     const std::array<double, 5> at = {row.soc, std::abs(row.current_a) / capacity_ah,
                                       record.temperature_c.empty() ? std::nan("") : record.temperature_c[row.k],
                                       now_s - last_edge_s, now_s - record.time_s.front()};
     for (std::size_t a = 0; a < at.size(); ++a) {
       if (!std::isfinite(at[a])) continue;
-      Sum& s = block[{a, range_of(axes()[a].edges, at[a])}];
+      Sum& s = block.sums[{a, range_of(axes()[a].edges, at[a])}];
       ++s.count;
       s.sum_v += residual_v;
       s.squares += residual_v * residual_v;
@@ -61,9 +73,15 @@ void ResidualRegimes::add_block(const diagnosis::PreparedRecording& record, cons
 
 std::vector<measurement::HealthyRegime> ResidualRegimes::regimes(const std::vector<char>& kept) const {
   std::map<std::pair<std::size_t, std::size_t>, std::vector<Sum>> all;
+  std::map<std::pair<std::size_t, std::size_t>, std::map<std::size_t, Sum>> parts;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     if (!kept.empty() && kept[b] == 0) continue;
-    for (const auto& [place, sum] : blocks_[b]) all[place].push_back(sum);
+    for (const auto& [place, sum] : blocks_[b].sums) {
+      all[place].push_back(sum);
+      Sum& part = parts[place][part_of(b)];
+      part.count += sum.count;
+      part.squares += sum.squares;
+    }
   }
   std::vector<measurement::HealthyRegime> list;
   for (const auto& [place, sums] : all) {
@@ -80,9 +98,36 @@ std::vector<measurement::HealthyRegime> ResidualRegimes::regimes(const std::vect
     r.rms_v = std::sqrt(squares / count);
     for (const Sum& s : sums) r.spread_v += (s.sum_v / s.count - r.bias_v) * (s.sum_v / s.count - r.bias_v);
     r.spread_v = std::sqrt(r.spread_v / std::max<double>(static_cast<double>(sums.size()) - 1, 1));
+    r.parts = static_cast<double>(parts[place].size());
+    r.high_v = high_v(parts[place]);
     list.push_back(r);
   }
   return list;
+}
+
+double ResidualRegimes::high_v(const std::map<std::size_t, Sum>& parts) {
+  const auto n = static_cast<double>(parts.size());
+  double mean = 0, variance = 0;
+  for (const auto& [part, sum] : parts) mean += sum.squares / sum.count / n;
+  for (const auto& [part, sum] : parts) variance += std::pow(sum.squares / sum.count - mean, 2) / std::max(n - 1, 1.0);
+  return std::sqrt(mean + std::sqrt(variance));
+}
+
+double ResidualRegimes::beyond_tolerance_v(const std::vector<char>& kept) const {
+  std::map<std::size_t, Block> parts;
+  for (std::size_t b = 0; b < blocks_.size(); ++b) {
+    if (kept[b] == 0 || !(blocks_[b].rows > 0)) continue;
+    Block& part = parts[part_of(b)];
+    part.rows += blocks_[b].rows;
+    part.squares += blocks_[b].squares;
+    part.expected += blocks_[b].expected;
+  }
+  double sum = 0, weights = diagnosis::thresholds.healthy.tolerance_counts;
+  for (const auto& [part, total] : parts) {
+    sum += std::max(total.squares - total.expected, 0.0) / total.rows;
+    ++weights;
+  }
+  return std::sqrt(sum / weights);
 }
 
 }  // namespace bms::workflow
