@@ -78,13 +78,13 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
     return true;
   }
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
-  /// A finding's `initial` is the first recording's; each other recording has a start of its own.
+  /// A finding's `initial` is the first recording's; each other recording has a start of its own. A full cell was
+  /// charged last.
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
     model::MechanismValues<S> value = with;
-    if (setup.record > 0 && setup.recording.initial_soc > thresholds.facts.charged_soc) {
+    if ((setup.own || setup.record > 0) && setup.recording.initial_soc > thresholds.facts.charged_soc) {
       value[initial] = S(1);
-      value[measured] = S(0);
     } else if (setup.own || setup.record > 0) {
       S start = setup.branch_shift + (setup.own ? number(value[initial]) : 0);
       if (number(start) > 1) start = S(1);
