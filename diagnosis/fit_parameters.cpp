@@ -17,7 +17,9 @@ FitParameters::FitParameters(const model::CellParameters<>& cell, const Hypothes
     const std::size_t mechanism = start.settings[s.setting].index;
     const model::Parameter& p = model::catalogue[mechanism].parameter[s.parameter];
     const Bounds file{p.lower(capacity_ah_), p.upper(capacity_ah_)};
-    parameters_.push_back({&p, knowledge_of(mechanism).bounds(s.parameter, file, rc_s)});
+    const auto known = knowledge_of(mechanism).known(s.parameter, start.settings[s.setting], cell);
+    parameters_.push_back(
+        {&p, knowledge_of(mechanism).bounds(s.parameter, file, rc_s), known.value_or(Usual{p.typical, p.spread})});
   }
 }
 
@@ -50,7 +52,7 @@ PriorDistance FitParameters::prior_distance(Eigen::Index j, double v) const {
   const model::Parameter& p = *at(j).parameter;
   const double log_sigma = thresholds.priors.log_sigma;
   if (is_shape(j)) return {std::log(v / p.default_value(capacity_ah_)) / log_sigma, log_sigma};
-  if (p.spread > 0) return {(v - p.typical) / p.spread, p.spread};
+  if (const Usual& usual = at(j).usual; usual.spread > 0) return {(v - usual.typical) / usual.spread, usual.spread};
   const double common = p.common(capacity_ah_);
   if (common <= 0 || std::abs(v) <= common) return {};
   const double sigma = thresholds.priors.rarity * common;

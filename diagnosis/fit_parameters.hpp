@@ -49,6 +49,7 @@ class FitParameters {
   struct Parameter {
     const model::Parameter* parameter;
     Bounds bounds;
+    Usual usual;
   };
   const Parameter& at(Eigen::Index j) const { return parameters_[static_cast<std::size_t>(j)]; }
 

@@ -75,6 +75,11 @@ struct Bounds {
   double low, high;
 };
 
+/// What is known of a parameter before any voltage is looked at; spread 0: nothing.
+struct Usual {
+  double typical = 0, spread = 0;
+};
+
 inline constexpr std::size_t no_mechanism = model::mechanism_count;
 
 /// What holds for a mechanism of which nothing special is known; and what there is to say of one.
@@ -105,6 +110,13 @@ struct DefaultKnowledge {
   }
   /// Values of its shape at which signatures are taken, each for every parameter with Role::shape. Empty: the default.
   static std::vector<double> probing_shapes(double /*capacity_ah*/) { return {}; }
+  static constexpr std::size_t forms = 1;  ///< of its law, which parameters with Role::given choose; each is fitted
+  static void choose_form(MechanismSetting& /*s*/, std::size_t /*form*/, const model::CellParameters<>& /*cell*/) {}
+  /// What the cell file knows of a parameter; nothing: what is known of most cells holds.
+  static std::optional<Usual> known(std::size_t /*parameter*/, const MechanismSetting& /*s*/,
+                                    const model::CellParameters<>& /*cell*/) {
+    return std::nullopt;
+  }
   /// Changes a probe whose shapes and strengths are set.
   static void adjust_probe(MechanismSetting& /*probe*/, const RecordingFacts& /*facts*/) {}
   /// Where a fit begins.
@@ -166,6 +178,9 @@ struct MechanismKnowledge {
   double searched_unknowns;
   std::string (*claim)(const MechanismSetting&);
   std::vector<double> (*probing_shapes)(double);
+  std::size_t forms;
+  void (*choose_form)(MechanismSetting&, std::size_t, const model::CellParameters<>&);
+  std::optional<Usual> (*known)(std::size_t, const MechanismSetting&, const model::CellParameters<>&);
   void (*adjust_probe)(MechanismSetting&, const RecordingFacts&);
   MechanismSetting (*start)(const SignatureFit&);
   std::optional<std::string> (*not_testable)(const TestConditions&);

@@ -26,6 +26,15 @@ Eigen::MatrixXd with_ridge(Eigen::MatrixXd gram) {
   return gram;
 }
 
+/// Returns true if both have the same form of their law: all parameters with Role::given are equal.
+bool same_form(const MechanismSetting& a, const MechanismSetting& b) {
+  const model::MechanismInfo& info = model::catalogue[a.index];
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    if (info.parameter[k].role == Role::given && a.value[k] != b.value[k]) return false;
+  }
+  return a.index == b.index;
+}
+
 }  // namespace
 
 Eigen::VectorXd Screen::toward(const Probe& probe) const {
@@ -48,18 +57,32 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   auto c = std::find_if(candidates_.begin(), candidates_.end(),
                         [&](const Candidate& other) { return other.mechanism == mechanism; });
   if (c == candidates_.end()) {
-    candidates_.push_back({mechanism, p.setting, {}, -std::numeric_limits<double>::infinity(), 0, 0, 0});
+    candidates_.push_back({mechanism, p.setting, {}, {}, -std::numeric_limits<double>::infinity(), 0, 0, 0});
     best_.push_back({p, gram});
     c = candidates_.end() - 1;
   }
   const double sigma = std::sqrt(std::max(regular.inverse()(0, 0), 0.0));  // its places free
   if (c->least_sigma == 0 || sigma < c->least_sigma) c->least_sigma = sigma;
-  if (gain <= c->gain || std::isnan(gain)) return;
+  if (std::isnan(gain)) return;
+  const MechanismSetting start = knowledge_of(mechanism).start({p.setting, p.parameters, found, capacity_ah});
+  keep_form(gain, start);
+  if (gain <= c->gain) return;
   c->gain = gain;
   c->estimate = found[0] + p.setting.value[p.parameters[0]];
   c->sigma = sigma;
-  c->start = knowledge_of(mechanism).start({p.setting, p.parameters, found, capacity_ah});
+  c->start = start;
   best_[static_cast<std::size_t>(c - candidates_.begin())] = {p, std::move(gram)};
+}
+
+/// The best start of each form of a mechanism's law.
+void Screen::keep_form(double gain, const MechanismSetting& start) {
+  if (knowledge_of(start.index).forms < 2) return;
+  const auto known =
+      std::find_if(forms_.begin(), forms_.end(), [&](const FormStart& f) { return same_form(f.start, start); });
+  if (known == forms_.end())
+    forms_.push_back({gain, start});
+  else if (gain > known->gain)
+    *known = {gain, start};
 }
 
 /// Bursts have no shape that could be projected: they are searched, and their gain is that of one column.
@@ -74,7 +97,7 @@ void Screen::judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit
   likelihood.whiten(bursts.column);
   const ResidualProjection::Products one = projection.of(bursts.column);
   const double g = one.gram(0, 1)(0, 0), b = one.toward()[0];
-  Candidate c{mechanism, {mechanism, {}, {}}, std::move(bursts.spans), 0, 0, 0, 0};
+  Candidate c{mechanism, {mechanism, {}, {}}, {}, std::move(bursts.spans), 0, 0, 0, 0};
   if (g > 0 && b > 0) c.gain = b * b / g - thresholds.decision.per_burst * static_cast<double>(bursts.count);
   c.start.value[contact_resistance] = bursts.resistance_ohm;
   c.start.value[burst_share] = bursts.covered_s / std::max(likelihood.records().front().duration_s(), 1.0);
@@ -110,6 +133,11 @@ Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, c
     if (around.hypothesis.find(mechanism) != nullptr || not_testable(likelihood, around.hypothesis, mechanism))
       continue;
     judge_bursts(likelihood, around, projection, mechanism);
+  }
+  for (Candidate& c : candidates_) {
+    for (const FormStart& f : forms_) {
+      if (f.start.index == c.mechanism && !same_form(f.start, c.start)) c.other_forms.push_back(f.start);
+    }
   }
   sort();
 }

@@ -18,6 +18,7 @@ namespace bms::diagnosis {
 struct Candidate {
   std::size_t mechanism = 0;
   MechanismSetting start;                        ///< estimate from the signature, where a fit begins
+  std::vector<MechanismSetting> other_forms;     ///< the same of the other forms of its law
   std::vector<std::vector<model::Span>> bursts;  ///< by record; of a loose contact only
   double gain = 0;                               ///< less what its number of unknowns gains on noise
   double estimate = 0, sigma = 0;                ///< of its first strength, to first order; sigma 0: not estimated
@@ -48,6 +49,7 @@ class Screen {
   /// Products of a probe's columns with the residual.
   Eigen::VectorXd toward(const Probe& probe) const;
   void judge(const LikelihoodModel& likelihood, const Probe& probe);
+  void keep_form(double gain, const MechanismSetting& start);
   void judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit& around,
                     const ResidualProjection& projection, std::size_t mechanism);
   void sort();
@@ -56,6 +58,11 @@ class Screen {
   ResidualProjection::Products products_;  ///< of the signatures' columns
   std::vector<Candidate> candidates_;
   std::vector<Shape> best_;  ///< of each candidate
+  struct FormStart {
+    double gain;
+    MechanismSetting start;
+  };
+  std::vector<FormStart> forms_;  ///< of mechanisms whose law has several
 };
 
 }  // namespace bms::diagnosis

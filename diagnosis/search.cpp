@@ -135,6 +135,11 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
   HypothesisFit best = likelihood_.fit(h, around.calibration, numerics.fit.iterations, hopeless);
+  for (const MechanismSetting& start : c.other_forms) {
+    HypothesisFit other =
+        likelihood_.fit(with(around.hypothesis, start), around.calibration, numerics.fit.iterations, hopeless);
+    if (other.cost < best.cost) best = std::move(other);
+  }
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;

@@ -100,8 +100,10 @@ std::vector<MechanismSetting> probe_settings(const LikelihoodModel& likelihood, 
   const bool shaped = !shapes.empty();
   if (!shaped) shapes = {0};
   std::vector<MechanismSetting> settings;
-  for (const double shape : shapes) {
+  for (std::size_t n = 0; n < knowledge.forms * shapes.size(); ++n) {
+    const double shape = shapes[n % shapes.size()];
     MechanismSetting& setting = settings.emplace_back(model::default_setting(mechanism, likelihood.cell()));
+    knowledge.choose_form(setting, n / shapes.size(), likelihood.cell());
     for (std::size_t k = 0; k < info.parameters; ++k) {
       const model::Parameter& parameter = info.parameter[k];
       if (parameter.role == Role::shape && shaped) setting.value[k] = shape;

@@ -206,6 +206,9 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
   curve.capacity_ah = mean_of(all);
   if (!charged.empty() && !discharged.empty()) curve.coulombic_efficiency = mean_of(discharged) / mean_of(charged);
 
+  if (charged.empty()) curve.branch = -1;
+  if (discharged.empty()) curve.branch = 1;
+
   const auto up = averaged(runs, true), down = averaged(runs, false);
   curve.charge_v = up;
   curve.discharge_v = down;

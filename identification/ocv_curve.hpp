@@ -23,6 +23,7 @@ struct SlowRun {
 struct OcvCurve {
   std::vector<double> soc, ocv_v, half_gap_v;  ///< half_gap_v: 0 if there was only one run
   std::vector<double> charge_v, discharge_v;   ///< means of the runs; NaN where no such run has been
+  double branch = 0;                           ///< of ocv_v: -1 discharges alone, 1 charges alone, 0 the middle
   double capacity_ah = 0;                      ///< mean of the charge that the runs moved
   std::optional<double> coulombic_efficiency;  ///< discharged over charged; only with a run of each kind
 };

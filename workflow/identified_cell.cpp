@@ -109,6 +109,7 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadO
   if (both_branches && curve.coulombic_efficiency) id::add_gap_corners(*pieces, curve, error_v, most_corners);
   auto& ocv = cell.parameters.ocv;
   ocv = {};
+  ocv.lean = curve.branch;
   for (std::size_t k = 0; k < pieces->soc.size(); ++k) {
     ocv.soc.push_back(pieces->soc[k]);
     if (curve.coulombic_efficiency) ocv.half_gap_v.push_back(pieces->half_gap_v[k]);

@@ -268,7 +268,7 @@ void write_sources(const IdentifyOptions& options, const IdentifyResult& result,
       "{} by {} from {}, {} node{}: {:.2f} mV RMS, fit {:.1f} %; standard deviations allow for correlated "
       "residuals",
       result.model, result.optimizer, files, nodes, nodes == 1 ? "" : "s", 1e3 * fit.rmse_v, fit.fit_percent);
-  if (position != 0) {
+  if (position != 0 && cell.parameters.ocv.half_gap_v.size > 0) {
     cell.sources["ocv"] += fmt::format("; {:.2f} of the way from the middle to slow {}", std::abs(position),
                                        position < 0 ? "discharge" : "charge");
   }

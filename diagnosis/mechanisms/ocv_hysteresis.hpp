@@ -24,6 +24,8 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static constexpr bool report_limit = true;
   static constexpr Fact facts = Fact::reversals | Fact::rests;
   static constexpr std::size_t half_gap = 0, ocv_at = 2, initial = 3, measured = 4;  ///< places of the parameters
+  static constexpr double gap_share = 0.2;       ///< of the cell file's gap: so far a slow current's drop is in it
+  static constexpr double branch_sigma = 0.1;    ///< of the branch on which the cell file says that its OCV lies
   static constexpr double probing_share = 0.02;  ///< of the largest half gap: small enough to be linear
   static constexpr double smallest_start_v = 0.001, largest_start_v = 0.06;  ///< [V] half gap where a fit begins
   static constexpr double smallest_throughput_soc = 0.03;                    ///< charge moved, over the capacity
@@ -34,6 +36,20 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
         size_text(s, half_gap));
   }
   static std::vector<double> probing_shapes(double) { return {12, 30, 80, 220}; }
+  /// Form 0 relaxes exponentially with the charge moved, form 1 moves with it up to a branch (a play).
+  static constexpr std::size_t forms = 2;
+  static void choose_form(MechanismSetting& s, std::size_t form, const model::CellParameters<>&) {
+    s.value[measured] = static_cast<double>(form);
+  }
+  /// The gap of the cell file, and the branch on which its OCV lies.
+  static std::optional<Usual> known(std::size_t parameter, const MechanismSetting& s,
+                                    const model::CellParameters<>& cell) {
+    if (s.value[measured] < 1) return std::nullopt;
+    const double gap_v = model::plateau_half_gap_v(cell.ocv);
+    if (parameter == half_gap && gap_v > 0) return Usual{gap_v, gap_share * gap_v};
+    if (parameter == ocv_at && (gap_v > 0 || cell.ocv.lean != 0)) return Usual{cell.ocv.lean, branch_sigma};
+    return std::nullopt;
+  }
   static void adjust_probe(MechanismSetting& probe, const RecordingFacts& seen) {
     probe.value[half_gap] = probing_share * model::OcvHysteresis::parameters[half_gap].upper(seen.capacity_ah);
   }
@@ -51,9 +67,10 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
     if (c.facts.throughput_soc < smallest_throughput_soc) return "too little charge is moved";
     return std::nullopt;
   }
-  /// A cell file with the gap between charge and discharge says that there is a hysteresis.
+  /// A cell file with the gap between charge and discharge, or with one of both curves, says that there is a
+  /// hysteresis.
   static bool expected(const model::CellParameters<>& cell, const RecordingFacts&) {
-    return cell.ocv.half_gap_v.size > 0;
+    return cell.ocv.half_gap_v.size > 0 || cell.ocv.lean != 0;
   }
   /// The branch position at the start belongs to the recording.
   static bool carry_over(MechanismSetting& s) {
@@ -61,13 +78,13 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
     return true;
   }
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
-  /// A finding's `initial` is the first recording's; each other recording has a start of its own.
+  /// A finding's `initial` is the first recording's; each other recording has a start of its own. A full cell was
+  /// charged last.
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
     model::MechanismValues<S> value = with;
-    if (setup.record > 0 && setup.recording.initial_soc > thresholds.facts.charged_soc) {
+    if ((setup.own || setup.record > 0) && setup.recording.initial_soc > thresholds.facts.charged_soc) {
       value[initial] = S(1);
-      value[measured] = S(0);
     } else if (setup.own || setup.record > 0) {
       S start = setup.branch_shift + (setup.own ? number(value[initial]) : 0);
       if (number(start) > 1) start = S(1);

@@ -6,8 +6,8 @@
 // does not change h. `measured` selects how h moves, and M:
 //
 //   0   dh/dt = gamma |I| / (3600 C_n) (sgn I - h), M constant (Plett, J. Power Sources 134 (2004) 252, Part 2, with
-//       its decay in moved charge). The diagnosis searches for this form
-//   1   dh/dt = gamma I / (3600 C_n), limited to -1 .. 1, and M follows the cell file's half_gap_v over SOC: at h = -1
+//       its decay in moved charge). The diagnosis fits both forms
+//   1   dh/dt = gamma I / (3600 C_n), limited to -1 .. 1, and M follows half_gap_v over SOC, if it is known: at h = -1
 //       and 1 the OCV is the curve that was measured in discharge and in charge. In a drive with regenerative braking a
 //       cell stays near its discharge branch, with the knees of that branch. The first form, whose mean h is (charge -
 //       discharge) / (charge + discharge), puts it halfway

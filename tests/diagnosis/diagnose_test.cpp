@@ -1,7 +1,9 @@
 // The whole diagnosis of recordings of the plant's cell, whose equations are not those of the catalogue.
 #include "diagnosis/diagnose.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 
 #include <gmock/gmock.h>
 
@@ -66,6 +68,30 @@ TEST(Diagnose, VoltageOffsetAndGainAreAmbiguousForAnLfpCell) {
   std::vector<std::string> set = ids_of(d);
   for (const std::size_t e : d.findings.front().equivalent_to) set.emplace_back(model::catalogue[e].id);
   EXPECT_THAT(set, testing::IsSupersetOf({"voltage_offset", "voltage_gain"}));
+}
+
+/// Half gap times the distance to the discharge branch, with a branch position that moves with the charge and stays
+/// within -1 .. 1, and one that relaxes exponentially.
+std::function<double(std::size_t, double, double)> branch_v(double half_gap_v, double per_soc, bool play) {
+  return [=, h = 1.0](std::size_t, double current_a, double) mutable {
+    const double moved = per_soc * current_a / (3'600 * 6);
+    h = play ? std::clamp(h + moved, -1.0, 1.0) : h + std::abs(moved) * ((current_a > 0 ? 1 : -1) - h);
+    return half_gap_v * (h + 1);
+  };
+}
+
+TEST(Diagnose, FindsHowTheBranchMoves) {
+  model::CellParameters<> of_discharge = test::table9();
+  of_discharge.ocv.lean = -1;
+  for (const bool play : {true, false}) {
+    const Diagnosis d =
+        diagnose(of_discharge, {}, {test::recorded(test::drive(2, 22), 0.7, 22, branch_v(0.02, 40, play))});
+    ASSERT_THAT(ids_of(d), Contains("ocv_hysteresis"));
+    const MechanismSetting& found = *d.extended.find(model::mechanism_index("ocv_hysteresis"));
+    EXPECT_EQ(found.value[4], play ? 1 : 0);
+    EXPECT_NEAR(found.value[0], 0.02, 0.003);
+    EXPECT_NEAR(found.value[2], -1, 0.2);
+  }
 }
 
 TEST(Diagnose, WhatNoMechanismExplainsIsUnknown) {

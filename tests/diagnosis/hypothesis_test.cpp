@@ -90,6 +90,29 @@ TEST(Hypothesis, DerivativesByBranchPositionAndShareEqualFiniteDifferences) {
   EXPECT_GT(exact.col(branch).norm(), 1);
 }
 
+/// The branch of the cell file's hysteresis at the start of a recording, and how it moves.
+TEST(Hypothesis, AFullCellBeginsOnItsChargeBranchAndLeavesItWithTheCharge) {
+  const model::CellParameters<> cell = test::table9();
+  constexpr double half_gap_v = 0.02, decay = 40, moved = 0.01;
+  model::MechanismSetting own = model::default_setting(model::mechanism_index("ocv_hysteresis"), cell);
+  own.value = {half_gap_v, decay, 0, 0, 1};
+  std::vector<double> current_a(101, -moved * 3'600 * cell.capacity_ah / 100);
+  current_a.front() = 0;
+  std::vector<PreparedRecording> records = {test::recorded(current_a, 0.95, 9), test::recorded(current_a, 0.6, 9),
+                                            test::recorded(current_a, 0.95, 9)};
+  const LikelihoodModel with(cell, {own}, records, NoiseModel{}), without(cell, {}, records, NoiseModel{});
+  const auto branch_v = [&](std::size_t record, std::size_t row) {
+    return with.voltage(with.base(), with.unchanged(), record)[row] -
+           without.voltage(without.base(), without.unchanged(), record)[row];
+  };
+  for (const std::size_t full : {0, 2}) {
+    EXPECT_NEAR(branch_v(full, 0), half_gap_v, 1e-9);
+    EXPECT_NEAR(branch_v(full, 100), half_gap_v * (1 - decay * moved), 1e-4);
+  }
+  EXPECT_NEAR(branch_v(1, 0), 0, 1e-9);
+  EXPECT_NEAR(branch_v(1, 100), -half_gap_v * decay * moved, 1e-4);
+}
+
 /// By every base parameter, as a dual number through the whole recording: slow but simple. One record, one mechanism.
 Columns plain_calibration_derivatives(const LikelihoodModel& likelihood, const Hypothesis& h,
                                       const Eigen::VectorXd& at) {

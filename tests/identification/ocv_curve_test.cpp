@@ -48,6 +48,9 @@ TEST(OcvCurve, OneRunAloneIsUsedUnchanged) {
   const OcvCurve curve = ocv_curve({slow_run(false)});
   EXPECT_FALSE(curve.coulombic_efficiency);
   EXPECT_EQ(curve.half_gap_v[500], 0);
+  EXPECT_EQ(curve.branch, -1);
+  EXPECT_EQ(ocv_curve({slow_run(true)}).branch, 1);
+  EXPECT_EQ(ocv_curve({slow_run(false), slow_run(true)}).branch, 0);
   EXPECT_NEAR(curve.ocv_v[500], plant::table9_ocv_v().at(0.5) - gap_v - 0.005, 0.002);
 }
 
