@@ -102,7 +102,8 @@ double best_lag(const std::vector<double>& v, const Track& track, double step_s)
   const double now = error_at_lag(v, track.model_v, 0);
   double best = now;
   std::ptrdiff_t found = 0;
-  for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(of_channels.lag_to_s); ++lag) {
+  const double last_s = std::max(of_channels.lag_to_s, of_channels.lag_rows * step_s);
+  for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(last_s); ++lag) {
     const double error = error_at_lag(v, track.model_v, lag);
     if (error >= best) continue;
     best = error;

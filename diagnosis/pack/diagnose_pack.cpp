@@ -366,7 +366,7 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   d.unexplained = unexplained_cells(pack, s.fits, explained, d.noise_v);
   const Matrix& information = s.fits[typical_cell(s)].all().of_parameters;
   d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm);
-  d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood.least_gain());
+  d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood);
   d.reference = reference_of(s);
   d.channels = s.channels;
   return d;

@@ -95,15 +95,16 @@ struct PackThresholds {
     std::size_t moving_rows = 12;           ///< at least
     double held_share = 0.34;               ///< of moving rows without a change, from which on a channel is held
     double most_channels = 0.5;             ///< share from which on it is the pack's way of reading
-    double lag_from_s = -3, lag_to_s = 30;  ///< searched
-    double lag_gain = 0.1;                  ///< share of the error that a lag must explain
-    double late_rows = 1.5;                 ///< from which on a lag is certain
-    double grouped_share = 0.25;            ///< more channels than that are a group that is read later
-    double least_rows_late = 0.5;           ///< of a delay that is named: less is a matter of the sampling
-    double staggered_s = 0.07;              ///< spread of sampling times that is reported
-    double staggered_sigmas = 6;            ///< the same over its standard deviation
-    double missing_share = 0.2;             ///< of readings
-    double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
+    double lag_from_s = -3, lag_to_s = 30;  ///< searched,
+    double lag_rows = 12;          ///< and at least so many rows late: monitors are slow in rows, not in seconds
+    double lag_gain = 0.1;         ///< share of the error that a lag must explain
+    double late_rows = 1.5;        ///< from which on a lag is certain
+    double grouped_share = 0.25;   ///< more channels than that are a group that is read later
+    double least_rows_late = 0.5;  ///< of a delay that is named: less is a matter of the sampling
+    double staggered_s = 0.07;     ///< spread of sampling times that is reported
+    double staggered_sigmas = 6;   ///< the same over its standard deviation
+    double missing_share = 0.2;    ///< of readings
+    double step_c = 0.05;          ///< [C] step of the current for an apparent resistance
   } channels;
 
   /// When channels are read, from steps of the current that stand alone.
@@ -131,10 +132,12 @@ struct PackThresholds {
   struct Sensors {
     double healthy_k = 1.2;       ///< difference of a temperature sensor to the median, at the start
     std::size_t start_rows = 60;  ///< whose median is the start
-    double odds = 9;              ///< [ln] as least_odds, with the number of sensors
+    double odds = 6;              ///< [ln] posterior odds of a fault of this sensor against none of it
     double fault_k = 20;          ///< standard deviation of a faulty one
     double least_k = 3;
     std::size_t least_sensors = 3;                        ///< two sensors do not show which one is wrong
+    std::size_t many_sensors = 5;                         ///< from which on they show their own spread
+    std::size_t most_sensors = 63, most_faulty = 3;       ///< of the search for sets of faulty ones
     double pack_gain = 0.004, pack_offset_share = 0.002;  ///< healthy voltmeter of a pack
     double pack_joint_share = 0.1;  ///< of the cells' resistance: cables and contactors within the pack's voltage
     double pack_sigmas = 5;         ///< times the healthy spread, from which on it is named

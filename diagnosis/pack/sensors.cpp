@@ -1,7 +1,9 @@
 #include "diagnosis/pack/sensors.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -17,18 +19,96 @@ namespace {
 
 constexpr const PackThresholds::Sensors& of_sensors = limits.sensors;
 
-/// Log density of a centred normal variable.
-double log_normal(double x, double sigma) { return -std::log(sigma) - x * x / (2 * sigma * sigma); }
+/// What the sensors show at the start, before a load has warmed the cells, and over the recording: medians.
+struct SensorLevels {
+  std::vector<double> at_start_k, overall_k;
+};
 
-/// By row: median of all sensors. With three of them, a faulty one does not move it.
-std::vector<double> median_of_sensors(const PackRecording& pack) {
-  std::vector<double> medians, values;
-  for (std::size_t k = 0; k < pack.rows(); ++k) {
-    values.clear();
-    for (const auto& sensor : pack.sensor_c) values.push_back(sensor[k]);
-    medians.push_back(measurement::median(values));
+SensorLevels levels_of(const PackRecording& pack) {
+  SensorLevels levels;
+  for (const std::vector<double>& sensor : pack.sensor_c) {
+    levels.overall_k.push_back(measurement::median(sensor));
+    std::vector<double> first = sensor;
+    first.resize(std::min(first.size(), of_sensors.start_rows));
+    levels.at_start_k.push_back(measurement::median(first));
   }
-  return medians;
+  return levels;
+}
+
+/// Spread of the sensors that are not at fault. Three or four do not show it if two are.
+double usual_spread(const std::vector<double>& x) {
+  if (x.size() < of_sensors.many_sensors) return of_sensors.healthy_k;
+  const double middle = measurement::median(x);
+  std::vector<double> apart;
+  for (const double v : x) apart.push_back(std::abs(v - middle));
+  return std::max(of_sensors.healthy_k, measurement::median(apart) / abs_median_of_normal);
+}
+
+/// Which sensors are at fault, as a set of bits, and its logarithmic probability but for a constant.
+struct FaultySet {
+  std::uint64_t sensors = 0;
+  double log_p = 0;
+  bool has(std::size_t m) const { return ((sensors >> m) & std::uint64_t{1}) != 0; }
+};
+
+/// x: levels of the sensors. Their common temperature is unknown and integrated out.
+double log_probability(std::uint64_t faulty, const std::vector<double>& x, double healthy_k) {
+  double sum_w = 0, sum_wx = 0, sum_wxx = 0, log_p = 0;
+  for (std::size_t m = 0; m < x.size(); ++m) {
+    const bool bad = ((faulty >> m) & std::uint64_t{1}) != 0;
+    const double variance = healthy_k * healthy_k + (bad ? of_sensors.fault_k * of_sensors.fault_k : 0);
+    const double from_first = x[m] - x.front();
+    sum_w += 1 / variance;
+    sum_wx += from_first / variance;
+    sum_wxx += from_first * from_first / variance;
+    log_p -= std::log(variance) / 2;
+    if (bad) log_p += std::log(limits.fault_prior / static_cast<double>(x.size()));
+  }
+  return log_p - std::log(sum_w) / 2 - (sum_wxx - sum_wx * sum_wx / sum_w) / 2;
+}
+
+/// All sets of at most half of the sensors, or of two; the most probable one first.
+std::vector<FaultySet> faulty_sets(const std::vector<double>& x, double healthy_k) {
+  const std::size_t most = std::clamp<std::size_t>(x.size() / 2, 2, of_sensors.most_faulty);
+  std::vector<FaultySet> sets = {{0, log_probability(0, x, healthy_k)}};
+  std::vector<std::uint64_t> larger = {0};
+  for (std::size_t size = 1; size <= most; ++size) {
+    std::vector<std::uint64_t> smaller = std::move(larger);
+    larger.clear();
+    for (const std::uint64_t set : smaller) {
+      for (auto m = static_cast<std::size_t>(std::bit_width(set)); m < x.size(); ++m) {
+        larger.push_back(set | (std::uint64_t{1} << m));
+        sets.push_back({larger.back(), log_probability(larger.back(), x, healthy_k)});
+      }
+    }
+  }
+  const auto more = [](const FaultySet& a, const FaultySet& b) { return a.log_p > b.log_p; };
+  std::stable_sort(sets.begin(), sets.end(), more);
+  const double largest = sets.front().log_p;
+  double sum = 0;
+  for (const FaultySet& s : sets) sum += std::exp(s.log_p - largest);
+  for (FaultySet& s : sets) s.log_p -= largest + std::log(sum);
+  return sets;
+}
+
+double log_p_of(const std::vector<FaultySet>& sets, std::uint64_t sensors) {
+  return std::find_if(sets.begin(), sets.end(), [&](const FaultySet& s) { return s.sensors == sensors; })->log_p;
+}
+
+/// Of the sensor m: that it is at fault.
+double probability_of(const std::vector<FaultySet>& sets, std::size_t m) {
+  double sum = 0;
+  for (const FaultySet& s : sets) sum += s.has(m) ? std::exp(s.log_p) : 0;
+  return sum;
+}
+
+/// Difference to the sensors that are not in the set, of the levels.
+double apart_from_others(const std::vector<double>& x, const FaultySet& set, std::size_t m) {
+  std::vector<double> others;
+  for (std::size_t o = 0; o < x.size(); ++o) {
+    if (o != m && !set.has(o)) others.push_back(x[o]);
+  }
+  return x[m] - measurement::median(others);
 }
 
 /// Means over blocks of rows in which all cells have a reading.
@@ -67,36 +147,33 @@ std::vector<Block> blocks_of(const PackRecording& pack) {
 std::vector<PackFinding> check_thermistors(const PackRecording& pack) {
   std::vector<PackFinding> findings;
   const std::size_t sensors = pack.sensor_c.size();
-  if (sensors < of_sensors.least_sensors) return findings;
-  std::vector<double> apart(sensors), at_start(sensors);
-  const std::vector<double> middle_c = median_of_sensors(pack);
-  for (std::size_t m = 0; m < sensors; ++m) {
-    std::vector<double> differences;
-    for (std::size_t k = 0; k < pack.rows(); ++k) differences.push_back(pack.sensor_c[m][k] - middle_c[k]);
-    apart[m] = measurement::median(differences);
-    differences.resize(std::min(differences.size(), of_sensors.start_rows));
-    at_start[m] = measurement::median(differences);
+  if (sensors < of_sensors.least_sensors || sensors > of_sensors.most_sensors) return findings;
+  const SensorLevels levels = levels_of(pack);
+  for (const double level : levels.at_start_k) {
+    if (!std::isfinite(level)) return findings;
   }
+  const double healthy = usual_spread(levels.at_start_k);
+  const std::vector<FaultySet> sets = faulty_sets(levels.at_start_k, healthy);
+  const FaultySet& best = sets.front();
   for (std::size_t m = 0; m < sensors; ++m) {
-    std::vector<double> of_others;
-    for (std::size_t o = 0; o < sensors; ++o) {
-      if (o != m) of_others.push_back(std::abs(apart[o]));
-    }
-    const double spread = measurement::median(of_others) / abs_median_of_normal;
-    const double healthy = std::max(of_sensors.healthy_k, spread);
+    if (!best.has(m)) continue;
+    const double start_k = apart_from_others(levels.at_start_k, best, m),
+                 all_k = apart_from_others(levels.overall_k, best, m);
     // an offset is there from the start; what a load warms is not
-    const double offset_k = std::abs(at_start[m]) < std::abs(apart[m]) ? at_start[m] : apart[m];
-    const double odds = log_normal(offset_k, std::hypot(healthy, of_sensors.fault_k)) - log_normal(offset_k, healthy);
-    if (!(std::abs(offset_k) > of_sensors.least_k) || at_start[m] * apart[m] < 0 ||
-        odds < of_sensors.odds + std::log(static_cast<double>(sensors)))
-      continue;
+    const double offset_k = std::abs(start_k) < std::abs(all_k) ? start_k : all_k;
+    const double gain = best.log_p - log_p_of(sets, best.sensors & ~(std::uint64_t{1} << m));
+    if (!(std::abs(offset_k) > of_sensors.least_k) || start_k * all_k < 0 || gain < of_sensors.odds) continue;
     PackFinding f;
     f.cause = Cause::thermistor;
     f.cell = m;
     f.value = offset_k;
     f.sigma = healthy;
-    f.gain = odds;
-    f.probability = 1 - std::exp(-(odds - std::log(static_cast<double>(sensors) / limits.fault_prior)));
+    f.gain = gain;
+    f.probability = probability_of(sets, m);
+    for (std::size_t o = 0; o < sensors; ++o) {
+      const double p = best.has(o) ? 0 : probability_of(sets, o);
+      if (p >= limits.listed_from) f.rivals.push_back({Cause::thermistor, o, p});
+    }
     findings.push_back(std::move(f));
   }
   return findings;
