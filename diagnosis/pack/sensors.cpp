@@ -35,15 +35,6 @@ SensorLevels levels_of(const PackRecording& pack) {
   return levels;
 }
 
-/// Spread of the sensors that are not at fault. Three or four do not show it if two are.
-double usual_spread(const std::vector<double>& x) {
-  if (x.size() < of_sensors.many_sensors) return of_sensors.healthy_k;
-  const double middle = measurement::median(x);
-  std::vector<double> apart;
-  for (const double v : x) apart.push_back(std::abs(v - middle));
-  return std::max(of_sensors.healthy_k, measurement::median(apart) / abs_median_of_normal);
-}
-
 /// Which sensors are at fault, as a set of bits, and its logarithmic probability but for a constant.
 struct FaultySet {
   std::uint64_t sensors = 0;
@@ -51,26 +42,52 @@ struct FaultySet {
   bool has(std::size_t m) const { return ((sensors >> m) & std::uint64_t{1}) != 0; }
 };
 
-/// x: levels of the sensors. Their common temperature is unknown and integrated out.
-double log_probability(std::uint64_t faulty, const std::vector<double>& x, double healthy_k) {
-  double sum_w = 0, sum_wx = 0, sum_wxx = 0, log_p = 0;
+/// The course of the temperature over the pack: a level, the middle against the ends, one end against the other.
+Eigen::Vector3d course_at(std::size_t sensor, std::size_t of) {
+  const double place = (2 * static_cast<double>(sensor) + 1) / static_cast<double>(of) - 1;
+  return {1, 1 - place * place, place};
+}
+
+/// Least squares of the levels, with the faulty ones known worse; the level is unknown, the rest of the course is
+/// small.
+struct CourseFit {
+  double log_p = 0;    ///< of the levels, integrated over the course, but for a constant
+  double rest_k2 = 0;  ///< mean square of the usual sensors' rest
+};
+
+CourseFit fit_course(std::uint64_t faulty, const std::vector<double>& x, double healthy_k) {
+  Eigen::Matrix3d normal =
+      Eigen::Vector3d(0, std::pow(of_sensors.middle_k, -2), std::pow(of_sensors.end_k, -2)).asDiagonal();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  CourseFit fit;
+  double square = 0;
+  const auto is_bad = [&](std::size_t m) { return ((faulty >> m) & std::uint64_t{1}) != 0; };
+  const auto from_first = [&](std::size_t m) { return x[m] - x.front(); };
   for (std::size_t m = 0; m < x.size(); ++m) {
-    const bool bad = ((faulty >> m) & std::uint64_t{1}) != 0;
-    const double variance = healthy_k * healthy_k + (bad ? of_sensors.fault_k * of_sensors.fault_k : 0);
-    const double from_first = x[m] - x.front();
-    sum_w += 1 / variance;
-    sum_wx += from_first / variance;
-    sum_wxx += from_first * from_first / variance;
-    log_p -= std::log(variance) / 2;
-    if (bad) log_p += std::log(limits.fault_prior / static_cast<double>(x.size()));
+    const double variance = healthy_k * healthy_k + (is_bad(m) ? of_sensors.fault_k * of_sensors.fault_k : 0);
+    const Eigen::Vector3d c = course_at(m, x.size());
+    normal += c * c.transpose() / variance;
+    right += from_first(m) * c / variance;
+    square += from_first(m) * from_first(m) / variance;
+    fit.log_p -= std::log(variance) / 2;
+    if (is_bad(m)) fit.log_p += std::log(limits.fault_prior / static_cast<double>(x.size()));
   }
-  return log_p - std::log(sum_w) / 2 - (sum_wxx - sum_wx * sum_wx / sum_w) / 2;
+  const Eigen::Vector3d course = normal.ldlt().solve(right);
+  fit.log_p -= (std::log(normal.determinant()) + square - right.dot(course)) / 2;
+  double usual = 0;
+  for (std::size_t m = 0; m < x.size(); ++m) {
+    if (is_bad(m)) continue;
+    fit.rest_k2 += std::pow(from_first(m) - course_at(m, x.size()).dot(course), 2);
+    ++usual;
+  }
+  fit.rest_k2 /= std::max(1.0, usual - of_sensors.course_parameters);
+  return fit;
 }
 
 /// All sets of at most half of the sensors, or of two; the most probable one first.
 std::vector<FaultySet> faulty_sets(const std::vector<double>& x, double healthy_k) {
   const std::size_t most = std::clamp<std::size_t>(x.size() / 2, 2, of_sensors.most_faulty);
-  std::vector<FaultySet> sets = {{0, log_probability(0, x, healthy_k)}};
+  std::vector<FaultySet> sets = {{0, fit_course(0, x, healthy_k).log_p}};
   std::vector<std::uint64_t> larger = {0};
   for (std::size_t size = 1; size <= most; ++size) {
     std::vector<std::uint64_t> smaller = std::move(larger);
@@ -78,7 +95,7 @@ std::vector<FaultySet> faulty_sets(const std::vector<double>& x, double healthy_
     for (const std::uint64_t set : smaller) {
       for (auto m = static_cast<std::size_t>(std::bit_width(set)); m < x.size(); ++m) {
         larger.push_back(set | (std::uint64_t{1} << m));
-        sets.push_back({larger.back(), log_probability(larger.back(), x, healthy_k)});
+        sets.push_back({larger.back(), fit_course(larger.back(), x, healthy_k).log_p});
       }
     }
   }
@@ -152,8 +169,12 @@ std::vector<PackFinding> check_thermistors(const PackRecording& pack) {
   for (const double level : levels.at_start_k) {
     if (!std::isfinite(level)) return findings;
   }
-  const double healthy = usual_spread(levels.at_start_k);
-  const std::vector<FaultySet> sets = faulty_sets(levels.at_start_k, healthy);
+  double healthy = of_sensors.healthy_k;
+  std::vector<FaultySet> sets = faulty_sets(levels.at_start_k, healthy);
+  if (sensors >= of_sensors.many_sensors) {  // fewer do not show their own spread
+    healthy = std::max(healthy, std::sqrt(fit_course(sets.front().sensors, levels.at_start_k, healthy).rest_k2));
+    sets = faulty_sets(levels.at_start_k, healthy);
+  }
   const FaultySet& best = sets.front();
   for (std::size_t m = 0; m < sensors; ++m) {
     if (!best.has(m)) continue;
