@@ -49,9 +49,18 @@ bool cannot_be_separated(const dp::PackFinding& f, const truth::PackFault& fault
   return !matrix.separable[a][b] || !matrix.separable[b][a];
 }
 
+/// What the diagnosis says it would name of this cause, in a typical cell.
+double limit_for(const truth::PackFault& fault, const dp::PackDiagnosis& d) {
+  for (const dp::PackLimit& l : d.detection_limits) {
+    if (dp::text_of(l.cause).id == fault.id) return l.value;
+  }
+  return 0;
+}
+
 PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis& d) {
   PlantedOutcome o;
   o.fault = fault;
+  o.limit = limit_for(fault, d);
   for (const dp::PackFinding& f : d.findings) {
     if (is_about(f, fault)) {
       o.named = o.cell_right = true;
@@ -68,19 +77,20 @@ PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis
   }
   o.listed = o.listed && !o.named;
   o.foretold = o.foretold && o.listed;
+  o.below = !o.named && !o.listed && std::abs(fault.size) < o.limit;
   return o;
 }
 
 struct Count {
-  std::size_t planted = 0, named = 0, listed = 0, foretold = 0, another = 0, missed = 0, sized = 0;
+  std::size_t planted = 0, named = 0, listed = 0, foretold = 0, another = 0, missed = 0, below = 0, sized = 0;
   std::vector<double> after_s;
 };
 
 std::string row_of(const std::string& name, Count c) {
   std::sort(c.after_s.begin(), c.after_s.end());
   const std::string time = c.after_s.empty() ? "" : fmt::format("{:.0f} min", c.after_s[c.after_s.size() / 2] / 60);
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed, c.foretold,
-                     c.another, c.missed, c.sized, time);
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed,
+                     c.foretold, c.another, c.missed, c.below, c.sized, time);
 }
 
 }  // namespace
@@ -130,6 +140,7 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
         const bool found = p.named || p.listed;
         c->another += !found && p.cell_right ? 1 : 0;
         c->missed += !found && !p.cell_right ? 1 : 0;
+        c->below += p.below ? 1 : 0;
         c->sized += p.named && std::abs(p.pull) <= 2 ? 1 : 0;
         if (p.named && p.after_s > 0) c->after_s.push_back(p.after_s);
       }
@@ -138,8 +149,9 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
   }
   std::string text =
       "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | of these, not separable by the matrix "
-      "| another cause for this cell | missed | right, size within 2 sigma | median time to name |\n"
-      "|---|---|---|---|---|---|---|---|---|\n";
+      "| another cause for this cell | missed | of these two, below the stated limit | right, size within 2 sigma "
+      "| median time to name |\n"
+      "|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [id, count] : by_cause) text += row_of("`" + id + "`", count);
   text += row_of("**physics and sensors**", all) + row_of("**faults of the data**", data);
   text += fmt::format(
@@ -162,6 +174,8 @@ std::string pack_json(const std::vector<PackOutcome>& outcomes) {
                          {"listed", p.listed},
                          {"foretold", p.foretold},
                          {"cell_right", p.cell_right},
+                         {"limit", p.limit},
+                         {"below", p.below},
                          {"found", p.found},
                          {"pull", p.pull},
                          {"instead", p.instead},

@@ -17,6 +17,8 @@ struct PlantedOutcome {
   bool listed = false;      ///< not first, but among what else it could be: the answer is AMBIGUOUS
   bool foretold = false;    ///< listed, and the matrix of the diagnosis says that this recording cannot separate them
   bool cell_right = false;  ///< the cell, with any cause
+  double limit = 0;         ///< smallest size of this cause that the diagnosis says it would name; 0: not stated
+  bool below = false;       ///< not named, and smaller than that
   std::string instead;      ///< what was said of this cell, if another cause was named first
   double found = 0;         ///< size, if named
   double pull = 0;          ///< (size - truth) / sigma, if named

@@ -60,8 +60,8 @@ const char* word_for(const bms::benchmark::PlantedOutcome& p) {
 void print(const PackOutcome& o) {
   fmt::print("{} ({} cells, {:.0f} h, {:.0f} s): {}\n", o.name, o.cells, o.hours, o.wall_s, o.verdict);
   for (const auto& p : o.planted)
-    fmt::print("  {} {} {} {:.4g}{}\n", word_for(p), p.fault.id,
-               p.fault.cell ? fmt::format("{}", *p.fault.cell + 1) : "-", p.fault.size,
+    fmt::print("  {} {} {} {:.4g} (limit {:.4g}){}\n", word_for(p), p.fault.id,
+               p.fault.cell ? fmt::format("{}", *p.fault.cell + 1) : "-", p.fault.size, p.limit,
                p.named ? fmt::format(", found {:.4g}, {:+.1f} sigma", p.found, p.pull) : "  " + p.instead);
   for (const std::string& text : o.wrong) fmt::print("  wrong {}\n", text);
   std::fflush(stdout);

@@ -109,7 +109,8 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
   const Track& t = *input.track;
   const std::vector<double>& v = pack.cell_v[input.cell];
   Linearised out(pack.rows());
-  Delayed delayed(pack.time_s, t.smooth_v, theta[delay]);
+  Delayed delayed(pack.time_s, t.smooth_v, input.known_delay_s.value_or(theta[delay]));
+  const RcVoltage own = rc_voltage_of(t, pack, theta[time_constant]);
   std::uint8_t here = 0, there = 0;
   double last_a = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
@@ -120,34 +121,34 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     const double difference_v = v[k] - t.neighbours_v[k];
     if (!std::isfinite(difference_v + current_a + late.v + di)) continue;
     const std::size_t then = late.row;  // when the channel was sampled
+    if (!t.uses_moving && (t.moving[k] != 0 || t.moving[then] != 0)) continue;
     const double dz = change_of_soc(t, theta, then);
     const auto from = model::look_up(t.cell, t.soc[then], here), to = model::look_up(t.cell, t.soc[then] + dz, there);
     // not the resistances' course over the state of charge: the cell file knows it too badly to measure a charge by it
     const double slope_v = to.ocv_delta_v * to.per_width;
     // what the neighbours lose; measured, it is closer to the truth than tables that were not compared with the pack
-    const double all_v = t.is_calibrated ? t.r0_by_row_ohm[then] * current_a + t.v_rc_v[then] : late.v - from.ocv_v;
+    const double all_v = t.is_calibrated ? t.r0_by_row_ohm[then] * current_a + own.v[then] : late.v - from.ocv_v;
     const double warmer_k = input.warmer_k.empty() || !std::isfinite(input.warmer_k[k]) ? 0 : input.warmer_k[k];
     auto row = out.columns.row(static_cast<Eigen::Index>(k));
     row[charge] = slope_v;
     row[capacity] = slope_v * (t.soc[then] - t.soc.front());
     row[leak] = -slope_v * t.days[then];
     row[resistance] = all_v;
-    row[polarisation] = t.v_rc_v[then];
-    const double tau_v = (1 + theta[resistance] + theta[polarisation]) * t.v_rc_by_tau_v[then];
-    row[time_constant] = tau_v;
+    row[polarisation] = own.v[then];
+    row[time_constant] = (1 + theta[resistance] + theta[polarisation]) * own.by_tau_v[then];
     row[tilt] = (t.soc[then] - 0.5) * all_v;
     row[joint] = current_a;
     row[offset] = 1;
     row[gain] = late.v;
     row[slope] = late.v - t.mean_v;
-    row[delay] = -late.slope_v_per_s;
+    row[delay] = input.known_delay_s ? 0 : -late.slope_v_per_s;
     row[temperature] = warmer_k * all_v;
     row[blur] = t.r0_ohm * (current_a - delayed.between(t.slow_a));
     const double course_v = (to.r0_ohm / from.r0_ohm - 1) * t.r0_by_row_ohm[then] * current_a +
                             (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then];
     const double shape_v = set_shapes(t.soc[then] + dz, theta, row);
     const double explained_v = to.ocv_v - from.ocv_v + course_v + theta[blur] * row[blur] + theta[resistance] * all_v +
-                               theta[polarisation] * t.v_rc_v[then] + theta[time_constant] * tau_v +
+                               theta[polarisation] * own.v[then] + own.v[then] - t.v_rc_v[then] +
                                theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] +
                                theta[gain] * late.v + theta[slope] * row[slope] + late.v - t.smooth_v[k] +
                                theta[temperature] * warmer_k * all_v + shape_v;

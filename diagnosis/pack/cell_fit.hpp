@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include <Eigen/Core>
@@ -57,6 +58,7 @@ struct FitInput {
   const Track* track = nullptr;
   std::vector<double> warmer_k;  ///< by row: temperature of the cell minus the mean of the sensors; empty: unknown
   std::size_t cell = 0;
+  std::optional<double> known_delay_s;  ///< of the channel, where the rows that are used do not show it
 };
 
 /// Where a fit begins: a coarse search over charge and capacity. lag_s: of the channel.

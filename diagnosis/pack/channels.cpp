@@ -7,6 +7,7 @@
 
 #include "diagnosis/noise.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/pack_verdict.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis::pack {
@@ -102,7 +103,8 @@ double best_lag(const std::vector<double>& v, const Track& track, double step_s)
   const double now = error_at_lag(v, track.model_v, 0);
   double best = now;
   std::ptrdiff_t found = 0;
-  for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(of_channels.lag_to_s); ++lag) {
+  const double last_s = std::max(of_channels.lag_to_s, of_channels.lag_rows * step_s);
+  for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(last_s); ++lag) {
     const double error = error_at_lag(v, track.model_v, lag);
     if (error >= best) continue;
     best = error;
@@ -167,10 +169,18 @@ std::vector<std::size_t> Channels::repeated() const {
   return list;
 }
 
-std::vector<std::size_t> Channels::late(double step_s) const {
+bool Channels::are_mostly_held() const {
+  return static_cast<double>(repeated().size()) >= of_channels.most_channels * static_cast<double>(cells.size());
+}
+
+double Channels::usual_lag_s() const {
   std::vector<double> lags;
   for (const ChannelState& s : cells) lags.push_back(s.lag_s);
-  const double usual_s = measurement::median(lags);
+  return measurement::median(lags);
+}
+
+std::vector<std::size_t> Channels::late(double step_s) const {
+  const double usual_s = usual_lag_s();
   std::vector<std::size_t> list;
   for (std::size_t k = 0; k < cells.size(); ++k) {
     if (!cells[k].held_s && std::abs(cells[k].lag_s - usual_s) > step_s * of_channels.late_rows) list.push_back(k);
@@ -208,6 +218,38 @@ Channels check_channels(const Track& track, PackRecording& pack) {
     channels.cells.push_back(s);
   }
   return channels;
+}
+
+void add_findings(const Channels& channels, std::vector<PackFinding>& findings) {
+  const std::vector<std::size_t> repeated = channels.repeated();
+  const auto add_held = [&](const std::vector<std::size_t>& cells) {
+    std::vector<double> times;
+    for (const std::size_t c : cells) times.push_back(*channels.cells[c].held_s);
+    PackFinding f;
+    f.cause = Cause::repeated;
+    if (cells.size() == 1) f.cell = cells.front();
+    f.cells = cells;
+    f.value = measurement::median(times);
+    for (double& t : times) t = std::abs(t - f.value);
+    f.sigma = measurement::median(times) / abs_median_of_normal;
+    f.probability = 1;
+    findings.push_back(std::move(f));
+  };
+  if (channels.are_mostly_held()) {
+    add_held(repeated);
+  } else {
+    for (const std::size_t c : repeated) add_held({c});
+  }
+  for (std::size_t c = 0; c < channels.cells.size(); ++c) {
+    const double share = channels.cells[c].missing_share;
+    if (share < of_channels.missing_share) continue;
+    PackFinding f;
+    f.cause = Cause::missing;
+    f.cell = c;
+    f.value = share;
+    f.probability = 1;
+    findings.push_back(std::move(f));
+  }
 }
 
 }  // namespace bms::diagnosis::pack

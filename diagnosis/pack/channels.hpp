@@ -25,17 +25,24 @@ struct ChannelState {
   double fresh_ohm = 0, stale_ohm = 0;
 };
 
+struct PackFinding;
+
 struct Channels {
   std::vector<ChannelState> cells;
   std::optional<double> pack_ohm;  ///< apparent resistance of the pack's voltmeter over the number of cells
 
   /// Cells that are repeated, ascending.
   std::vector<std::size_t> repeated() const;
+  double usual_lag_s() const;
+  bool are_mostly_held() const;
   /// Cells that lag by more than a row behind most others; none if they are many.
   std::vector<std::size_t> late(double step_s) const;
 };
 
 /// Removes impossible readings and the repeated readings of held channels from `pack`.
 Channels check_channels(const Track& track, PackRecording& pack);
+
+/// Adds the held channels and those without many readings.
+void add_findings(const Channels& channels, std::vector<PackFinding>& findings);
 
 }  // namespace bms::diagnosis::pack

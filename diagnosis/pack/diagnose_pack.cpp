@@ -15,6 +15,7 @@
 #include "diagnosis/pack/sampling_times.hpp"
 #include "diagnosis/pack/selection.hpp"
 #include "diagnosis/pack/sensors.hpp"
+#include "diagnosis/pack/shared_blocks.hpp"
 #include "diagnosis/pack/shared_current.hpp"
 #include "diagnosis/pack/unexplained.hpp"
 #include "measurement/statistics.hpp"
@@ -35,6 +36,7 @@ struct State {
   Vector healthy = Vector::Zero();
   std::vector<Accusation> late;  ///< channels that lag by whole rows: certain
   std::vector<Accusation> accused;
+  std::optional<PackFinding> staggered;
 
   void progress(double share, const std::string& what) const {
     if (options.progress) options.progress(share, what);
@@ -42,7 +44,13 @@ struct State {
 };
 
 FitInput input_of(const State& s, std::size_t cell) {
-  return {.pack = &s.pack, .track = &s.track, .warmer_k = warmer_than_mean(s.pack, cell, s.bad_sensors), .cell = cell};
+  FitInput input{.pack = &s.pack,
+                 .track = &s.track,
+                 .warmer_k = warmer_than_mean(s.pack, cell, s.bad_sensors),
+                 .cell = cell,
+                 .known_delay_s = {}};
+  if (!s.track.uses_moving) input.known_delay_s = s.channels.cells[cell].lag_s;
+  return input;
 }
 
 /// Standard deviations of the parameters of a cell if these accusations hold.
@@ -65,6 +73,14 @@ NoiseModel noise_for(const State& s, std::size_t cell) {
   noise.white_v = std::max(noise.white_v, white_noise(s.fits[cell].difference_v, s.pack.current_a,
                                                       limits.noise.quiet_c * s.track.capacity_ah, noise.white_v));
   return noise;
+}
+
+NoiseModel starting_noise() {
+  return {.white_v = limits.noise.white_v, .fast_v = limits.noise.fast_v, .slow_v = limits.noise.slow_v};
+}
+
+PackLikelihood likelihood_of(const State& s) {
+  return {s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s};
 }
 
 void fit_all(State& s, bool anything, double from, double to) {
@@ -116,15 +132,10 @@ std::optional<Eigen::Index> common_difference(const State& s) {
   return std::nullopt;
 }
 
-bool mostly_held(const State& s) {
-  return static_cast<double>(s.channels.repeated().size()) >=
-         limits.channels.most_channels * static_cast<double>(s.pack.cells());
-}
-
 void accuse(State& s) {
   s.healthy = healthy_spread(s.fits, s.track.r0_ohm);
   for (int round = 0; round < limits.fit.widenings; ++round) {
-    s.accused = select(PackLikelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s), s.late);
+    s.accused = select(likelihood_of(s), s.late);
     const std::optional<Eigen::Index> common = common_difference(s);
     if (!common) return;
     s.healthy[*common] *= limits.wider;
@@ -133,7 +144,7 @@ void accuse(State& s) {
 
 /// Accusations that the last fit no longer supports.
 void drop_unsupported(State& s) {
-  const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
+  const PackLikelihood likelihood = likelihood_of(s);
   const std::vector<Accusation> all = s.accused;
   std::erase_if(s.accused, [&](const Accusation& a) {
     if (std::find(s.late.begin(), s.late.end(), a) != s.late.end()) return false;
@@ -143,10 +154,34 @@ void drop_unsupported(State& s) {
   });
 }
 
+/// Channels that are read at different times; those that are accused or held do not count.
+std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likelihood) {
+  std::vector<std::size_t> cells;
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    const bool accused = std::any_of(s.accused.begin(), s.accused.end(), [&](const auto& a) { return a.touches(c); });
+    if (!accused && !s.channels.cells[c].held_s) cells.push_back(c);
+  }
+  return staggered_channels(s.track, s.pack, cells, likelihood);
+}
+
+/// Leaves out the rows in which the current changes, and keeps what they show of the channels' times. Where channels
+/// are read at different moments of a row with several steps, the current at a reading is unknown: not noise, but an
+/// error that goes with the current and that resistances would follow.
+void leave_moving_rows_out(State& s) {
+  s.healthy = healthy_spread(s.fits, s.track.r0_ohm);
+  s.staggered = staggered(s, likelihood_of(s));
+  s.track.uses_moving = false;
+  s.healthy = least_spread(s.track.r0_ohm);
+  s.noise = starting_noise();
+  fit_all(s, true, limits.done.first, limits.done.noise);
+  learn_noise(s);
+  fit_all(s, true, limits.done.noise, limits.done.second);
+}
+
 void fit_and_accuse(State& s) {
   s.healthy = least_spread(s.track.r0_ohm);
-  s.noise = {.white_v = limits.noise.white_v, .fast_v = limits.noise.fast_v, .slow_v = limits.noise.slow_v};
-  set_neighbours(s.track, s.pack, reference_of(s), mostly_held(s));
+  s.noise = starting_noise();
+  set_neighbours(s.track, s.pack, reference_of(s), s.channels.are_mostly_held());
   s.fits.resize(s.pack.cells());
   for (std::size_t c = 0; c < s.fits.size(); ++c) {
     s.fits[c].theta[delay] = s.channels.cells[c].lag_s;
@@ -163,9 +198,12 @@ void fit_and_accuse(State& s) {
   }
   learn_noise(s);
   fit_all(s, true, done.noise, done.second);
+  // of held channels only the rows with a new reading count: they are few, and their moments are known
+  const bool unknown_moment = s.noise.edge > limits.noise.unknown_edge || !steps_stand_alone(s.track, s.pack);
+  if (unknown_moment && !s.channels.are_mostly_held()) leave_moving_rows_out(s);
   accuse(s);
   // again around the accusations, with neighbours that are not accused
-  set_neighbours(s.track, s.pack, reference_of(s), mostly_held(s));
+  set_neighbours(s.track, s.pack, reference_of(s), s.channels.are_mostly_held());
   fit_all(s, false, done.second, done.third);
   accuse(s);
   fit_all(s, false, done.third, 1);
@@ -186,6 +224,27 @@ std::optional<double> named_after_s(const State& s, const PackLikelihood& likeli
   return since;
 }
 
+/// A cell with more resistance warms up more, and what it shows is less than what has grown. The size is that at the
+/// temperature of its neighbours, as far as it is known how the resistances follow the temperature.
+void add_self_heating(const State& s, PackFinding& f) {
+  const double warmer_k = measurement::mean(warmer_than_at_start(s.pack));
+  if (!(warmer_k > 0 && f.value > 0)) return;
+  const double hidden = (1 + f.value) * f.value * limits.self_heating.per_k * warmer_k;
+  f.value += hidden;
+  f.sigma = std::hypot(f.sigma, limits.self_heating.unknown * hidden);
+}
+
+/// A resistance and a joint differ only in their course over charge and time. What the one that is not named is beyond
+/// its healthy spread, of the same size as the named one, shows how badly the model knows this course.
+double taken_by_the_alike(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
+  if (a.cause != Cause::resistance && a.cause != Cause::joint) return 0;
+  const Cause other = a.cause == Cause::joint ? Cause::resistance : Cause::joint;
+  const double value = likelihood.size(s.accused, {other, a.cell}, likelihood.last_checkpoint()).value,
+               healthy = s.healthy[static_cast<Eigen::Index>(parameter_of(other))];
+  const double excess = std::max(0.0, std::abs(value) - limits.healthy_sigmas * healthy);
+  return a.cause == Cause::joint ? excess * s.track.r0_ohm : excess / s.track.r0_ohm;
+}
+
 PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
   std::vector<Accusation> others = s.accused;
   std::erase(others, a);
@@ -195,7 +254,7 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
   f.cause = a.cause;
   f.cell = a.cell;
   f.value = size.value;
-  f.sigma = size.sigma;
+  f.sigma = std::hypot(size.sigma, taken_by_the_alike(s, likelihood, a));
   f.gain = likelihood.gain(others, a, now);
   double sum = 1;
   for (const Accusation& rival : likelihood.rivals_of(a)) {
@@ -220,80 +279,20 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
   if (std::find(s.late.begin(), s.late.end(), a) != s.late.end()) {
     f.rivals.clear();
     f.probability = 1;
+    if (!s.track.uses_moving) {  // whole rows
+      f.value = s.channels.cells[a.cell].lag_s - s.channels.usual_lag_s();
+      f.sigma = s.track.step_s / 2;
+    }
   }
   std::stable_sort(f.rivals.begin(), f.rivals.end(),
                    [](const Rival& x, const Rival& y) { return x.probability > y.probability; });
   f.after_s = named_after_s(s, likelihood, others, a);
+  if (a.cause == Cause::resistance) add_self_heating(s, f);
   if (a.cause == Cause::capacity) {  // from 1 / capacity to capacity
     f.sigma /= (1 + f.value) * (1 + f.value);
     f.value = f.value / (1 + f.value);
   }
   return f;
-}
-
-/// Channels of the pack that are sampled at different times, against the spread that noise gives.
-std::optional<PackFinding> staggered(const State& s, const PackLikelihood& likelihood) {
-  std::vector<double> delays, sigmas;
-  std::vector<std::size_t> cells;
-  for (std::size_t c = 0; c < s.fits.size(); ++c) {
-    const bool accused = std::any_of(s.accused.begin(), s.accused.end(), [&](const auto& a) { return a.touches(c); });
-    if (accused || s.channels.cells[c].held_s) continue;
-    const Accusation a{Cause::late, c};
-    const Estimated e = likelihood.size({a}, a, likelihood.last_checkpoint());
-    delays.push_back(e.value);
-    cells.push_back(c);
-    // without the spread itself
-    sigmas.push_back(std::sqrt(std::max(0.0, e.sigma * e.sigma - s.healthy[delay] * s.healthy[delay])));
-  }
-  if (delays.size() < limits.unexplained.cells) return std::nullopt;
-  const double sigma = measurement::median(sigmas);
-  const double spread = s.healthy[delay];
-  if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
-  PackFinding f;
-  f.cause = Cause::staggered;
-  const double linear_s = span_of(delays);
-  const Estimated span =
-      sampling_span(s.track, s.pack, cells).value_or(Estimated{linear_s, limits.sampling_times.unknown * linear_s});
-  f.value = span.value;
-  f.sigma = std::hypot(span.sigma, sigma, limits.spread[delay].scale * f.value);
-  f.gain = spread / sigma;
-  f.probability = 1;
-  return f;
-}
-
-void add_held(const State& s, std::vector<PackFinding>& findings) {
-  const std::vector<std::size_t> repeated = s.channels.repeated();
-  const auto finding = [&](const std::vector<std::size_t>& cells) {
-    std::vector<double> times;
-    for (const std::size_t c : cells) times.push_back(*s.channels.cells[c].held_s);
-    PackFinding f;
-    f.cause = Cause::repeated;
-    if (cells.size() == 1) f.cell = cells.front();
-    f.cells = cells;
-    f.value = measurement::median(times);
-    for (double& t : times) t = std::abs(t - f.value);
-    f.sigma = measurement::median(times) / abs_median_of_normal;
-    f.probability = 1;
-    findings.push_back(std::move(f));
-  };
-  if (mostly_held(s)) {
-    finding(repeated);
-    return;
-  }
-  for (const std::size_t c : repeated) finding({c});
-}
-
-void add_missing(const State& s, std::vector<PackFinding>& findings) {
-  for (std::size_t c = 0; c < s.pack.cells(); ++c) {
-    const double share = s.channels.cells[c].missing_share;
-    if (share < limits.channels.missing_share) continue;
-    PackFinding f;
-    f.cause = Cause::missing;
-    f.cell = c;
-    f.value = share;
-    f.probability = 1;
-    findings.push_back(std::move(f));
-  }
 }
 
 Verdict verdict_of(const PackDiagnosis& d) {
@@ -312,7 +311,7 @@ Verdict verdict_of(const PackDiagnosis& d) {
 
 /// Takes the errors of the current sensor out of current and state of charge, before cells are compared.
 std::optional<PackFinding> correct_current(State& s, const model::CellParameters<>& cell, std::string& text) {
-  set_neighbours(s.track, s.pack, usual_cells(s.pack), mostly_held(s));
+  set_neighbours(s.track, s.pack, usual_cells(s.pack), s.channels.are_mostly_held());
   SharedState shared = shared_state_of(s.track, s.pack);
   text = shared.not_tested;
   if (!text.empty()) return std::nullopt;
@@ -341,7 +340,8 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
           .fits = {},
           .noise = {},
           .late = {},
-          .accused = {}};
+          .accused = {},
+          .staggered = {}};
   PackDiagnosis d;
   d.cells = pack.cells();
   d.duration_s = pack.time_s.back() - pack.time_s.front();
@@ -353,10 +353,10 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   s.bad_sensors = check_thermistors(pack);
   const std::optional<PackFinding> of_current = correct_current(s, cell, d.current_sensor);
   fit_and_accuse(s);
-  const PackLikelihood likelihood(s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s);
-  add_held(s, d.findings);
-  if (const auto f = staggered(s, likelihood)) d.findings.push_back(*f);
-  add_missing(s, d.findings);
+  const PackLikelihood likelihood = likelihood_of(s);
+  add_findings(s.channels, d.findings);
+  if (s.track.uses_moving) s.staggered = staggered(s, likelihood);
+  if (s.staggered) d.findings.push_back(*s.staggered);
   if (of_current) d.findings.push_back(*of_current);
   for (const Accusation& a : s.accused) d.findings.push_back(finding_of(s, likelihood, a));
   d.findings.insert(d.findings.end(), s.bad_sensors.begin(), s.bad_sensors.end());
@@ -366,7 +366,7 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   d.unexplained = unexplained_cells(pack, s.fits, explained, d.noise_v);
   const Matrix& information = s.fits[typical_cell(s)].all().of_parameters;
   d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm);
-  d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood.least_gain());
+  d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood);
   d.reference = reference_of(s);
   d.channels = s.channels;
   return d;

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "diagnosis/pack/pack_likelihood.hpp"
+#include <Eigen/Cholesky>
+
 #include "diagnosis/pack/pack_thresholds.hpp"
 
 namespace bms::diagnosis::pack {
@@ -57,18 +58,34 @@ Eigen::Index place_of(Cause cause) {
   return cause == Cause::sense_wire ? 2 * width : static_cast<Eigen::Index>(parameter_of(cause));
 }
 
-double marginal_for(const Data& d, const Eigen::VectorXd& with_data, Cause cause, double r0_ohm) {
+/// Gaussian prior of two cells, of which the first has this cause.
+Eigen::VectorXd prior_for(const Data& d, Cause cause, double r0_ohm) {
   Eigen::VectorXd prior = d.healthy;
   if (cause == Cause::sense_wire)
     prior[place_of(cause)] = std::hypot(prior[place_of(cause)], limits.spread[offset].fault);
   else
     widen_for(cause, d.healthy.head(width), r0_ohm, prior.head(width));
-  return log_marginal(d.information, with_data, prior);
+  return prior;
+}
+
+double marginal_for(const Data& d, const Eigen::VectorXd& with_data, Cause cause, double r0_ohm) {
+  return log_marginal(d.information, with_data, prior_for(d, cause, r0_ohm));
 }
 
 double example_of(Cause cause, double r0_ohm) {
   const Parameter p = parameter_of(cause);
   return limits.spread[p].example * (p == joint ? r0_ohm : 1);
+}
+
+/// Size that is as many times its standard deviation as a verdict asks for (PackLikelihood::is_possible).
+double significant_size(const Data& d, Cause cause, double r0_ohm) {
+  Eigen::MatrixXd normal = d.information;
+  normal.diagonal() += prior_for(d, cause, r0_ohm).array().square().inverse().matrix();
+  const Eigen::Index p = place_of(cause);
+  const double variance = normal.ldlt().solve(Eigen::VectorXd::Unit(normal.rows(), p))[p];
+  const double own = cause == Cause::sense_wire ? 0 : d.healthy[p];
+  const double scale = limits.spread[parameter_of(cause)].scale, sigmas = limits.least_sigmas;
+  return sigmas * std::sqrt((variance + own * own) / (1 - sigmas * sigmas * scale * scale));
 }
 
 std::vector<std::vector<bool>> separable(const Data& d, double r0_ohm) {
@@ -112,12 +129,11 @@ Isolability isolability_of(const Matrix& information, const Vector& healthy, dou
 }
 
 std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
-                                           double least_gain) {
+                                           const PackLikelihood& likelihood) {
   const Data d = data_of(information, healthy, nullptr);
   std::vector<PackLimit> list;
   for (const Cause cause : cell_causes) {
-    const Parameter p = parameter_of(cause);
-    const double least = limits.spread[p].least * (p == joint ? r0_ohm : 1);
+    const double least = likelihood.least()[parameter_of(cause)];
     // the gain is a square of the size minus a constant
     const auto gain_at = [&](double size) {
       const Eigen::VectorXd with_data = d.information.col(place_of(cause)) * size;
@@ -125,8 +141,8 @@ std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vect
     };
     const double constant = gain_at(0), of_example = gain_at(example_of(cause, r0_ohm)) - constant;
     if (!(of_example > 0)) continue;
-    const double size = example_of(cause, r0_ohm) * std::sqrt((least_gain - constant) / of_example);
-    list.push_back({cause, std::max(least, size)});
+    const double size = example_of(cause, r0_ohm) * std::sqrt((likelihood.least_gain() - constant) / of_example);
+    list.push_back({cause, std::max({least, size, significant_size(d, cause, r0_ohm)})});
   }
   return list;
 }

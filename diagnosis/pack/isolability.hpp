@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "diagnosis/pack/cell_fit.hpp"
+#include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_verdict.hpp"
 
 namespace bms::diagnosis::pack {
@@ -12,7 +13,9 @@ namespace bms::diagnosis::pack {
 /// information: of a typical healthy cell, with all rows. The data of a fault are what the model gives without noise.
 Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm);
 
+/// The sizes at which a cause that is alone in this cell would be named: by its gain, its significance, and the size
+/// that is worth a visit. likelihood: of this pack.
 std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
-                                           double least_gain);
+                                           const PackLikelihood& likelihood);
 
 }  // namespace bms::diagnosis::pack

@@ -204,21 +204,24 @@ Vector healthy_spread(const std::vector<CellFit>& fits, double r0_ohm) {
   const Vector least = least_spread(r0_ohm);
   Vector spread = least;
   for (int round = 0; round < limits.fit.scale_rounds; ++round) {
-    std::vector<std::vector<double>> squares(parameter_count), variances(parameter_count);
+    std::vector<std::vector<double>> values(parameter_count), variances(parameter_count);
     for (const CellFit& fit : fits) {
       Matrix normal = fit.all().of_parameters;
       normal.diagonal() += spread.array().square().inverse().matrix();
       const Matrix covariance = normal.inverse();
       const Vector theta = covariance * fit.all().with_data;
       for (Eigen::Index p = 0; p < width; ++p) {
-        squares[static_cast<std::size_t>(p)].push_back(theta[p] * theta[p]);
+        values[static_cast<std::size_t>(p)].push_back(theta[p]);
         variances[static_cast<std::size_t>(p)].push_back(covariance(p, p));
       }
     }
     for (Eigen::Index p = 0; p < width; ++p) {
       const auto k = static_cast<std::size_t>(p);
+      // a fault among the neighbours shifts all cells alike
+      const double common = measurement::median(values[k]);
+      for (double& v : values[k]) v = (v - common) * (v - common);
       const double of_estimates =
-          measurement::quantile(squares[k], usual_share(fits.size())) / square_of_quantile(usual_share(fits.size()));
+          measurement::quantile(values[k], usual_share(fits.size())) / square_of_quantile(usual_share(fits.size()));
       spread[p] = std::clamp(std::sqrt(of_estimates + measurement::median(variances[k])), least[p],
                              limits.spread[k].most * least[p]);
     }

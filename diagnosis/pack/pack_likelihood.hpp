@@ -52,6 +52,9 @@ class PackLikelihood {
   std::vector<Accusation> rivals_of(const Accusation& of) const;
   /// Posterior odds [ln] above which an accusation is named, in terms of the gain.
   double least_gain() const;
+  const Vector& healthy() const { return healthy_; }
+  /// A smaller size is never named: by parameter, for this recording's rows and length.
+  const Vector& least() const { return least_; }
   /// Returns true if a fault can have this size: large enough, significant, of the possible sign.
   bool is_possible(const Accusation& of, const Estimated& size) const;
 

@@ -59,6 +59,7 @@ struct PackThresholds {
   double least_odds = 4;         ///< [ln] posterior odds from which on a cause is named
   double further_in_cell = 6;    ///< [ln] more for a further cause in the same cell,
   double share_of_first = 0.03;  ///< and this share of what the first one gained: its model is not better
+  double healthy_sigmas = 2;     ///< of its spread, within which a parameter that is not named is healthy
   double alike_margin = 4;       ///< [ln] that does not separate two alike causes: no model is as exact as that
   double least_sigmas = 4;       ///< size over its standard deviation
   double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
@@ -72,6 +73,7 @@ struct PackThresholds {
     double quiet_c = 0.01;                    ///< [C] step of the current below which second differences show the noise
     double white_v = 0.001;                   ///< if there are too few quiet rows
     double fast_v = 0.0005, slow_v = 0.0005;  ///< starting values
+    double unknown_edge = 5;   ///< factor on edge_share, as learned, from which on the current of a reading is unknown
     double edge_share = 0.01;  ///< of R0 times a step of the current: error at the step, before it is learned
     double ocv_axis = 0.001;   ///< error of the OCV's SOC axis between cells
     double lowest_soc = 0.04, highest_soc = 0.98;  ///< beyond, the curve of the cell file is not to be trusted:
@@ -95,15 +97,16 @@ struct PackThresholds {
     std::size_t moving_rows = 12;           ///< at least
     double held_share = 0.34;               ///< of moving rows without a change, from which on a channel is held
     double most_channels = 0.5;             ///< share from which on it is the pack's way of reading
-    double lag_from_s = -3, lag_to_s = 30;  ///< searched
-    double lag_gain = 0.1;                  ///< share of the error that a lag must explain
-    double late_rows = 1.5;                 ///< from which on a lag is certain
-    double grouped_share = 0.25;            ///< more channels than that are a group that is read later
-    double least_rows_late = 0.5;           ///< of a delay that is named: less is a matter of the sampling
-    double staggered_s = 0.07;              ///< spread of sampling times that is reported
-    double staggered_sigmas = 6;            ///< the same over its standard deviation
-    double missing_share = 0.2;             ///< of readings
-    double step_c = 0.05;                   ///< [C] step of the current for an apparent resistance
+    double lag_from_s = -3, lag_to_s = 30;  ///< searched,
+    double lag_rows = 12;          ///< and at least so many rows late: monitors are slow in rows, not in seconds
+    double lag_gain = 0.1;         ///< share of the error that a lag must explain
+    double late_rows = 1.5;        ///< from which on a lag is certain
+    double grouped_share = 0.25;   ///< more channels than that are a group that is read later
+    double least_rows_late = 0.5;  ///< of a delay that is named: less is a matter of the sampling
+    double staggered_s = 0.07;     ///< spread of sampling times that is reported
+    double staggered_sigmas = 6;   ///< the same over its standard deviation
+    double missing_share = 0.2;    ///< of readings
+    double step_c = 0.05;          ///< [C] step of the current for an apparent resistance
   } channels;
 
   /// When channels are read, from steps of the current that stand alone.
@@ -120,6 +123,12 @@ struct PackThresholds {
     double unknown = 0.5;                       ///< relative error if the steps do not stand alone
   } sampling_times;
 
+  /// Of a cell with more resistance.
+  struct SelfHeating {
+    double per_k = 0.03;   ///< that the resistances of a cell fall, as the published 2 to 4 %
+    double unknown = 0.5;  ///< relative error of the effect: the law, and how much of the warmth is the load's
+  } self_heating;
+
   /// Of the current sensor.
   struct Sign {
     std::size_t most_rows_late = 6;  ///< of the voltages
@@ -129,12 +138,16 @@ struct PackThresholds {
   } sign;
 
   struct Sensors {
-    double healthy_k = 1.2;       ///< difference of a temperature sensor to the median, at the start
-    std::size_t start_rows = 60;  ///< whose median is the start
-    double odds = 9;              ///< [ln] as least_odds, with the number of sensors
-    double fault_k = 20;          ///< standard deviation of a faulty one
+    double healthy_k = 1.2;          ///< difference of a temperature sensor to the median, at the start
+    std::size_t start_rows = 60;     ///< whose median is the start
+    double odds = 6;                 ///< [ln] posterior odds of a fault of this sensor against none of it
+    double middle_k = 2, end_k = 1;  ///< the middle of a pack against its ends, an end against the middle: at rest
+    double course_parameters = 2;    ///< of this course that few sensors show
+    double fault_k = 20;             ///< standard deviation of a faulty one
     double least_k = 3;
     std::size_t least_sensors = 3;                        ///< two sensors do not show which one is wrong
+    std::size_t many_sensors = 5;                         ///< from which on they show their own spread
+    std::size_t most_sensors = 63, most_faulty = 3;       ///< of the search for sets of faulty ones
     double pack_gain = 0.004, pack_offset_share = 0.002;  ///< healthy voltmeter of a pack
     double pack_joint_share = 0.1;  ///< of the cells' resistance: cables and contactors within the pack's voltage
     double pack_sigmas = 5;         ///< times the healthy spread, from which on it is named
@@ -194,5 +207,7 @@ inline constexpr PackThresholds limits{};
 
 /// Constants of the normal distribution.
 inline constexpr double abs_median_of_normal = 0.6745, chi_square_median = 0.4549;
+/// Standard deviation of a uniform distribution over its width.
+inline constexpr double sigma_of_uniform = 0.2887;
 
 }  // namespace bms::diagnosis::pack

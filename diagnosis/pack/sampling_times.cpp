@@ -90,6 +90,13 @@ double span_of(std::vector<double> delays_s) {
   return (delays_s[delays_s.size() - 1 - few] - delays_s[few]) * last / used;
 }
 
+bool steps_stand_alone(const Track& track, const PackRecording& pack) { return !lone_steps(track, pack).empty(); }
+
+Estimated span_within_row(double linear_s, double step_s) {
+  const double longest_s = std::max(linear_s, step_s), width_s = longest_s - linear_s;
+  return {(linear_s + longest_s) / 2, std::max(width_s * sigma_of_uniform, of_times.unknown * (linear_s - step_s))};
+}
+
 std::optional<Estimated> sampling_span(const Track& track, const PackRecording& pack,
                                        const std::vector<std::size_t>& cells) {
   const std::vector<std::size_t> steps = lone_steps(track, pack);
@@ -104,6 +111,30 @@ std::optional<Estimated> sampling_span(const Track& track, const PackRecording& 
   for (std::size_t part = 0; part < of_times.parts; ++part)
     square += std::pow(span_of(shares_of(pack, cells, steps, part)) - span, 2);
   return Estimated{row_s * span, row_s * std::sqrt(square * (parts - 1) / parts)};
+}
+
+std::optional<PackFinding> staggered_channels(const Track& track, const PackRecording& pack,
+                                              const std::vector<std::size_t>& cells, const PackLikelihood& likelihood) {
+  std::vector<double> delays, sigmas;
+  const double spread = likelihood.healthy()[delay];
+  for (const std::size_t c : cells) {
+    const Accusation a{Cause::late, c};
+    const Estimated e = likelihood.size({a}, a, likelihood.last_checkpoint());
+    delays.push_back(e.value);
+    // without the spread itself
+    sigmas.push_back(std::sqrt(std::max(0.0, e.sigma * e.sigma - spread * spread)));
+  }
+  if (delays.size() < limits.unexplained.cells) return std::nullopt;
+  const double sigma = measurement::median(sigmas);
+  if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
+  PackFinding f;
+  f.cause = Cause::staggered;
+  const Estimated span = sampling_span(track, pack, cells).value_or(span_within_row(span_of(delays), track.step_s));
+  f.value = span.value;
+  f.sigma = std::hypot(span.sigma, sigma, limits.spread[delay].scale * f.value);
+  f.gain = spread / sigma;
+  f.probability = 1;
+  return f;
 }
 
 }  // namespace bms::diagnosis::pack

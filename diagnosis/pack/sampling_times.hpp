@@ -11,6 +11,7 @@
 
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_recording.hpp"
+#include "diagnosis/pack/pack_verdict.hpp"
 #include "diagnosis/pack/track.hpp"
 
 namespace bms::diagnosis::pack {
@@ -19,9 +20,20 @@ namespace bms::diagnosis::pack {
 /// spread.
 double span_of(std::vector<double> delays_s);
 
+/// Returns true if most steps of the current stand alone: then, the current at a reading follows from the neighbours.
+bool steps_stand_alone(const Track& track, const PackRecording& pack);
+
+/// What is known if only the delays of a linear fit are: where several steps lie in a row they are too small, and the
+/// channels are read within a row of step_s. Every time between is as probable.
+Estimated span_within_row(double linear_s, double step_s);
+
 /// From the first to the last one of these cells' channels [s]. Nothing if most steps of the current do not stand
 /// alone: then, what happened within a row is unknown.
 std::optional<Estimated> sampling_span(const Track& track, const PackRecording& pack,
                                        const std::vector<std::size_t>& cells);
+
+/// Whether these cells' channels are read at different times, against the spread that noise gives.
+std::optional<PackFinding> staggered_channels(const Track& track, const PackRecording& pack,
+                                              const std::vector<std::size_t>& cells, const PackLikelihood& likelihood);
 
 }  // namespace bms::diagnosis::pack

@@ -1,7 +1,9 @@
 #include "diagnosis/pack/sensors.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <Eigen/Cholesky>
@@ -17,18 +19,113 @@ namespace {
 
 constexpr const PackThresholds::Sensors& of_sensors = limits.sensors;
 
-/// Log density of a centred normal variable.
-double log_normal(double x, double sigma) { return -std::log(sigma) - x * x / (2 * sigma * sigma); }
+/// What the sensors show at the start, before a load has warmed the cells, and over the recording: medians.
+struct SensorLevels {
+  std::vector<double> at_start_k, overall_k;
+};
 
-/// By row: median of all sensors. With three of them, a faulty one does not move it.
-std::vector<double> median_of_sensors(const PackRecording& pack) {
-  std::vector<double> medians, values;
-  for (std::size_t k = 0; k < pack.rows(); ++k) {
-    values.clear();
-    for (const auto& sensor : pack.sensor_c) values.push_back(sensor[k]);
-    medians.push_back(measurement::median(values));
+SensorLevels levels_of(const PackRecording& pack) {
+  SensorLevels levels;
+  for (const std::vector<double>& sensor : pack.sensor_c) {
+    levels.overall_k.push_back(measurement::median(sensor));
+    std::vector<double> first = sensor;
+    first.resize(std::min(first.size(), of_sensors.start_rows));
+    levels.at_start_k.push_back(measurement::median(first));
   }
-  return medians;
+  return levels;
+}
+
+/// Which sensors are at fault, as a set of bits, and its logarithmic probability but for a constant.
+struct FaultySet {
+  std::uint64_t sensors = 0;
+  double log_p = 0;
+  bool has(std::size_t m) const { return ((sensors >> m) & std::uint64_t{1}) != 0; }
+};
+
+/// The course of the temperature over the pack: a level, the middle against the ends, one end against the other.
+Eigen::Vector3d course_at(std::size_t sensor, std::size_t of) {
+  const double place = (2 * static_cast<double>(sensor) + 1) / static_cast<double>(of) - 1;
+  return {1, 1 - place * place, place};
+}
+
+/// Least squares of the levels, with the faulty ones known worse; the level is unknown, the rest of the course is
+/// small.
+struct CourseFit {
+  double log_p = 0;    ///< of the levels, integrated over the course, but for a constant
+  double rest_k2 = 0;  ///< mean square of the usual sensors' rest
+};
+
+CourseFit fit_course(std::uint64_t faulty, const std::vector<double>& x, double healthy_k) {
+  Eigen::Matrix3d normal =
+      Eigen::Vector3d(0, std::pow(of_sensors.middle_k, -2), std::pow(of_sensors.end_k, -2)).asDiagonal();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  CourseFit fit;
+  double square = 0;
+  const auto is_bad = [&](std::size_t m) { return ((faulty >> m) & std::uint64_t{1}) != 0; };
+  const auto from_first = [&](std::size_t m) { return x[m] - x.front(); };
+  for (std::size_t m = 0; m < x.size(); ++m) {
+    const double variance = healthy_k * healthy_k + (is_bad(m) ? of_sensors.fault_k * of_sensors.fault_k : 0);
+    const Eigen::Vector3d c = course_at(m, x.size());
+    normal += c * c.transpose() / variance;
+    right += from_first(m) * c / variance;
+    square += from_first(m) * from_first(m) / variance;
+    fit.log_p -= std::log(variance) / 2;
+    if (is_bad(m)) fit.log_p += std::log(limits.fault_prior / static_cast<double>(x.size()));
+  }
+  const Eigen::Vector3d course = normal.ldlt().solve(right);
+  fit.log_p -= (std::log(normal.determinant()) + square - right.dot(course)) / 2;
+  double usual = 0;
+  for (std::size_t m = 0; m < x.size(); ++m) {
+    if (is_bad(m)) continue;
+    fit.rest_k2 += std::pow(from_first(m) - course_at(m, x.size()).dot(course), 2);
+    ++usual;
+  }
+  fit.rest_k2 /= std::max(1.0, usual - of_sensors.course_parameters);
+  return fit;
+}
+
+/// All sets of at most half of the sensors, or of two; the most probable one first.
+std::vector<FaultySet> faulty_sets(const std::vector<double>& x, double healthy_k) {
+  const std::size_t most = std::clamp<std::size_t>(x.size() / 2, 2, of_sensors.most_faulty);
+  std::vector<FaultySet> sets = {{0, fit_course(0, x, healthy_k).log_p}};
+  std::vector<std::uint64_t> larger = {0};
+  for (std::size_t size = 1; size <= most; ++size) {
+    std::vector<std::uint64_t> smaller = std::move(larger);
+    larger.clear();
+    for (const std::uint64_t set : smaller) {
+      for (auto m = static_cast<std::size_t>(std::bit_width(set)); m < x.size(); ++m) {
+        larger.push_back(set | (std::uint64_t{1} << m));
+        sets.push_back({larger.back(), fit_course(larger.back(), x, healthy_k).log_p});
+      }
+    }
+  }
+  const auto more = [](const FaultySet& a, const FaultySet& b) { return a.log_p > b.log_p; };
+  std::stable_sort(sets.begin(), sets.end(), more);
+  const double largest = sets.front().log_p;
+  double sum = 0;
+  for (const FaultySet& s : sets) sum += std::exp(s.log_p - largest);
+  for (FaultySet& s : sets) s.log_p -= largest + std::log(sum);
+  return sets;
+}
+
+double log_p_of(const std::vector<FaultySet>& sets, std::uint64_t sensors) {
+  return std::find_if(sets.begin(), sets.end(), [&](const FaultySet& s) { return s.sensors == sensors; })->log_p;
+}
+
+/// Of the sensor m: that it is at fault.
+double probability_of(const std::vector<FaultySet>& sets, std::size_t m) {
+  double sum = 0;
+  for (const FaultySet& s : sets) sum += s.has(m) ? std::exp(s.log_p) : 0;
+  return sum;
+}
+
+/// Difference to the sensors that are not in the set, of the levels.
+double apart_from_others(const std::vector<double>& x, const FaultySet& set, std::size_t m) {
+  std::vector<double> others;
+  for (std::size_t o = 0; o < x.size(); ++o) {
+    if (o != m && !set.has(o)) others.push_back(x[o]);
+  }
+  return x[m] - measurement::median(others);
 }
 
 /// Means over blocks of rows in which all cells have a reading.
@@ -67,36 +164,37 @@ std::vector<Block> blocks_of(const PackRecording& pack) {
 std::vector<PackFinding> check_thermistors(const PackRecording& pack) {
   std::vector<PackFinding> findings;
   const std::size_t sensors = pack.sensor_c.size();
-  if (sensors < of_sensors.least_sensors) return findings;
-  std::vector<double> apart(sensors), at_start(sensors);
-  const std::vector<double> middle_c = median_of_sensors(pack);
-  for (std::size_t m = 0; m < sensors; ++m) {
-    std::vector<double> differences;
-    for (std::size_t k = 0; k < pack.rows(); ++k) differences.push_back(pack.sensor_c[m][k] - middle_c[k]);
-    apart[m] = measurement::median(differences);
-    differences.resize(std::min(differences.size(), of_sensors.start_rows));
-    at_start[m] = measurement::median(differences);
+  if (sensors < of_sensors.least_sensors || sensors > of_sensors.most_sensors) return findings;
+  const SensorLevels levels = levels_of(pack);
+  for (const double level : levels.at_start_k) {
+    if (!std::isfinite(level)) return findings;
   }
+  double healthy = of_sensors.healthy_k;
+  std::vector<FaultySet> sets = faulty_sets(levels.at_start_k, healthy);
+  if (sensors >= of_sensors.many_sensors) {  // fewer do not show their own spread
+    healthy = std::max(healthy, std::sqrt(fit_course(sets.front().sensors, levels.at_start_k, healthy).rest_k2));
+    sets = faulty_sets(levels.at_start_k, healthy);
+  }
+  const FaultySet& best = sets.front();
   for (std::size_t m = 0; m < sensors; ++m) {
-    std::vector<double> of_others;
-    for (std::size_t o = 0; o < sensors; ++o) {
-      if (o != m) of_others.push_back(std::abs(apart[o]));
-    }
-    const double spread = measurement::median(of_others) / abs_median_of_normal;
-    const double healthy = std::max(of_sensors.healthy_k, spread);
+    if (!best.has(m)) continue;
+    const double start_k = apart_from_others(levels.at_start_k, best, m),
+                 all_k = apart_from_others(levels.overall_k, best, m);
     // an offset is there from the start; what a load warms is not
-    const double offset_k = std::abs(at_start[m]) < std::abs(apart[m]) ? at_start[m] : apart[m];
-    const double odds = log_normal(offset_k, std::hypot(healthy, of_sensors.fault_k)) - log_normal(offset_k, healthy);
-    if (!(std::abs(offset_k) > of_sensors.least_k) || at_start[m] * apart[m] < 0 ||
-        odds < of_sensors.odds + std::log(static_cast<double>(sensors)))
-      continue;
+    const double offset_k = std::abs(start_k) < std::abs(all_k) ? start_k : all_k;
+    const double gain = best.log_p - log_p_of(sets, best.sensors & ~(std::uint64_t{1} << m));
+    if (!(std::abs(offset_k) > of_sensors.least_k) || start_k * all_k < 0 || gain < of_sensors.odds) continue;
     PackFinding f;
     f.cause = Cause::thermistor;
     f.cell = m;
     f.value = offset_k;
     f.sigma = healthy;
-    f.gain = odds;
-    f.probability = 1 - std::exp(-(odds - std::log(static_cast<double>(sensors) / limits.fault_prior)));
+    f.gain = gain;
+    f.probability = probability_of(sets, m);
+    for (std::size_t o = 0; o < sensors; ++o) {
+      const double p = best.has(o) ? 0 : probability_of(sets, o);
+      if (p >= limits.listed_from) f.rivals.push_back({Cause::thermistor, o, p});
+    }
     findings.push_back(std::move(f));
   }
   return findings;

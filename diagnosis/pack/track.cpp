@@ -39,8 +39,10 @@ bool moves(const Track& track, const PackRecording& pack, std::size_t k) {
 /// Without noise where the current is constant: there, the model and the mean difference to it.
 void set_smooth(Track& track, const PackRecording& pack) {
   std::vector<double> apart_v(pack.rows(), no_value);
+  track.moving.assign(pack.rows(), 0);
   for (std::size_t k = 0; k < pack.rows(); ++k) {
-    if (!moves(track, pack, k)) apart_v[k] = track.neighbours_v[k] - track.model_v[k];
+    track.moving[k] = moves(track, pack, k) ? 1 : 0;
+    if (track.moving[k] == 0) apart_v[k] = track.neighbours_v[k] - track.model_v[k];
   }
   track.smooth_v = track.neighbours_v;
   const std::vector<double> mean_v = moving_mean(apart_v, limits.smooth_rows);
@@ -75,6 +77,23 @@ double usual_step_s(const PackRecording& pack) {
   return std::max(measurement::median(steps), std::numeric_limits<double>::epsilon());
 }
 
+RcVoltage rc_voltage_of(const Track& track, const PackRecording& pack, double ln_factor) {
+  RcVoltage p;
+  const double factor = std::exp(ln_factor);
+  double v = 0, by_tau_v = 0, last_s = pack.time_s.front();
+  for (std::size_t k = 0; k < pack.rows(); ++k) {
+    const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
+    const double share = (pack.time_s[k] - last_s) / (factor * track.tau_s[k]);
+    last_s = pack.time_s[k];
+    const double missing_v = track.r1_by_row_ohm[k] * current_a - v, passed = -std::expm1(-share);
+    by_tau_v = (1 - passed) * (by_tau_v - share * missing_v);
+    v += passed * missing_v;
+    p.v.push_back(v);
+    p.by_tau_v.push_back(by_tau_v);
+  }
+  return p;
+}
+
 Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor) {
   const PreparedCell prepared = model::prepare<double, model::max_intervals>(cell);
   Track t;
@@ -85,23 +104,19 @@ Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, c
   t.is_calibrated = !factor.empty();
   t.soc = pack.soc;
   t.step_s = usual_step_s(pack);
-  double v_rc_v = 0, by_tau_v = 0, last_s = pack.time_s.front();
   std::uint8_t interval = 0;
   for (std::size_t k = 0; k < pack.rows(); ++k) {
     const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
-    const double dt_s = pack.time_s[k] - last_s;
-    last_s = pack.time_s[k];
     const auto at = model::look_up(t.cell, t.soc[k], interval);
-    const double share = dt_s / (at.r1_ohm * at.c1_f), decay = std::exp(-share);
-    const double f = factor.empty() ? 1 : factor[k], missing_v = f * at.r1_ohm * current_a - v_rc_v;
-    by_tau_v = decay * (by_tau_v - share * missing_v);
-    v_rc_v += -std::expm1(-share) * missing_v;
-    t.v_rc_v.push_back(v_rc_v);
-    t.v_rc_by_tau_v.push_back(by_tau_v);
-    t.model_v.push_back(at.ocv_v + v_rc_v + f * at.r0_ohm * current_a);
+    const double f = factor.empty() ? 1 : factor[k];
     t.r0_by_row_ohm.push_back(f * at.r0_ohm);
+    t.r1_by_row_ohm.push_back(f * at.r1_ohm);
+    t.tau_s.push_back(at.r1_ohm * at.c1_f);
+    t.model_v.push_back(at.ocv_v + f * at.r0_ohm * current_a);
     t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));
   }
+  t.v_rc_v = rc_voltage_of(t, pack, 0).v;
+  for (std::size_t k = 0; k < pack.rows(); ++k) t.model_v[k] += t.v_rc_v[k];
   return t;
 }
 

@@ -21,7 +21,7 @@ struct Track {
   std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
   bool is_calibrated = false;                ///< the resistances follow from this pack
   std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file
-  std::vector<double> v_rc_by_tau_v;         ///< derivative of v_rc_v by ln(R1 C1)
+  std::vector<double> r1_by_row_ohm, tau_s;  ///< the same of the polarisation
   std::vector<double> days;                  ///< since the start
   double mean_v = 0;                         ///< of the neighbours
   std::vector<double> neighbours_v;          ///< mean voltage of the cells that serve as the reference; NaN: unknown
@@ -32,17 +32,27 @@ struct Track {
   /// neighbours' voltage.
   std::vector<double> instant_a;
   std::vector<double> slow_a;  ///< its mean over some rows before and after: the same for channels that are read later
+  std::vector<char> moving;    ///< rows before or after which the current changes
+  bool uses_moving = true;     ///< false: what happened within such a row is unknown, and it is left out
 };
+
+/// Voltage of the polarisation by row, and its derivative by ln(R1 C1).
+struct RcVoltage {
+  std::vector<double> v, by_tau_v;
+};
+/// For a time constant that is exp(ln_factor) times that of the track.
+RcVoltage rc_voltage_of(const Track& track, const PackRecording& pack, double ln_factor);
 
 /// Median time between rows.
 double usual_step_s(const PackRecording& pack);
 
-/// Without neighbours_v, smooth_v, instant_a and slow_a. factor: by row, on the resistances of the cell file; empty: 1.
+/// Without neighbours_v, smooth_v, instant_a, slow_a and moving. factor: by row, on the resistances of the cell file;
+/// empty: 1.
 Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor = {});
 
-/// Sets neighbours_v, smooth_v, instant_a and slow_a: the mean of these cells. Rows in which less than half of them
-/// have a reading have no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells; for
-/// held channels.
+/// Sets neighbours_v, smooth_v, instant_a, slow_a and moving: the mean of these cells. Rows in which less than half of
+/// them have a reading have no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells;
+/// for held channels.
 void set_neighbours(Track& track, const PackRecording& pack, const std::vector<std::size_t>& reference,
                     bool by_voltmeter);
 

@@ -70,15 +70,17 @@ dp::Track track_of(const dp::PackRecording& pack, double course = 0) {
 }
 
 /// The last cell against the first half of the others.
-dp::CellFit fit_of(const dp::PackRecording& pack, dp::Parameter fault = dp::joint, double course = 0) {
-  const dp::Track track = track_of(pack, course);
+dp::CellFit fit_of(const dp::PackRecording& pack, dp::Parameter fault = dp::joint, double course = 0,
+                   bool uses_moving = true) {
+  dp::Track track = track_of(pack, course);
+  track.uses_moving = uses_moving;
   dp::Vector prior = dp::least_spread(r0_ohm);
   prior[fault] = dp::fault_spread(r0_ohm)[fault];
   prior[dp::blur] = 1;
   prior[dp::resistance] = 1e-6;  // without polarisation it is the same as a joint
   prior[dp::delay] = 1e-6;       // the neighbours have no common moment that a delay could be measured from
-  return dp::fit_cell({.pack = &pack, .track = &track, .warmer_k = {}, .cell = cells - 1}, dp::Vector::Zero(), prior,
-                      {.white_v = noise_v, .fast_v = 2e-5, .slow_v = 2e-5});
+  return dp::fit_cell({.pack = &pack, .track = &track, .warmer_k = {}, .cell = cells - 1, .known_delay_s = {}},
+                      dp::Vector::Zero(), prior, {.white_v = noise_v, .fast_v = 2e-5, .slow_v = 2e-5});
 }
 
 TEST(PackTrack, TheNeighboursHaveNoNoiseWhereTheCurrentIsConstant) {
@@ -109,6 +111,35 @@ TEST(PackCellFit, AChannelThatIsReadBeforeItsNeighboursRespondsMoreToFastChanges
   EXPECT_LT(std::abs(alike.theta[dp::blur]), 0.02);
   EXPECT_GT(early.theta[dp::blur], 0.04);
   EXPECT_LT(std::abs(early.theta[dp::joint]), 0.1 * r0_ohm);
+}
+
+TEST(PackTrack, TheRcVoltageFollowsAnyTimeConstantExactly) {
+  const dp::PackRecording pack = recording_of(20, 0);
+  model::CellParameters<> cell = tests::table9, slow = tests::table9;
+  for (std::size_t k = 0; k < slow.rc.c1_f.size; ++k) slow.rc.c1_f[k] *= 2;
+  const dp::Track track = dp::track_of(cell, pack), other = dp::track_of(slow, pack);
+  const dp::RcVoltage found = dp::rc_voltage_of(track, pack, std::log(2.0)),
+                      near = dp::rc_voltage_of(track, pack, std::log(2.0) + 1e-4);
+  for (std::size_t k = 0; k < rows; k += 97) {
+    EXPECT_NEAR(found.v[k], other.v_rc_v[k], 1e-9) << k;
+    EXPECT_NEAR(found.by_tau_v[k], (near.v[k] - found.v[k]) / 1e-4, 1e-2 * (1e-4 + std::abs(found.by_tau_v[k]))) << k;
+  }
+}
+
+TEST(PackCellFit, ReadingsAtAnUnknownCurrentMakeNoJointIfMovingRowsAreLeftOut) {
+  dp::PackRecording pack = recording_of(5, 0);
+  const dp::Track track = track_of(pack);
+  std::size_t steady = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    if (track.moving[k] != 0)
+      pack.cell_v.back()[k] += 0.3 * r0_ohm * pack.current_a[k];
+    else
+      ++steady;
+  }
+  EXPECT_GT(fit_of(pack).used, steady);
+  const dp::CellFit fit = fit_of(pack, dp::joint, 0, false);
+  EXPECT_LT(std::abs(fit.theta[dp::joint]), 0.02 * r0_ohm);
+  EXPECT_EQ(fit.used, steady);
 }
 
 TEST(PackCellFit, RowsCountLessWhereTheModelIsInexact) {

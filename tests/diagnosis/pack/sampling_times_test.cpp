@@ -87,5 +87,10 @@ TEST(PackSamplingTimes, AreUnknownIfTheChannelsAreReadARowAfterTheCurrent) {
   EXPECT_FALSE(span_in(recording_of(Current(5, 20, rows), 1, 1.1, 0.5)));
 }
 
+TEST(PackSamplingTimes, OfALinearFitAreAtLeastThatAndAtMostARow) {
+  const dp::Estimated span = dp::span_within_row(1.4, 10);
+  for (const double span_s : {1.4, 3.0, 7.0, 10.0}) EXPECT_LT(std::abs(span.value - span_s), 2 * span.sigma) << span_s;
+}
+
 }  // namespace
 }  // namespace bms
