@@ -198,9 +198,11 @@ void fit_and_accuse(State& s) {
   }
   learn_noise(s);
   fit_all(s, true, done.noise, done.second);
-  // of held channels only the rows with a new reading count: they are few, and their moments are known
+  // of held channels only the rows with a new reading count: they are few, and their moments are known. Rows far apart
+  // do not show whether the current was constant between them
   const bool unknown_moment = s.noise.edge > limits.noise.unknown_edge || !steps_stand_alone(s.track, s.pack);
-  if (unknown_moment && !s.channels.are_mostly_held()) leave_moving_rows_out(s);
+  if (unknown_moment && !s.channels.are_mostly_held() && s.track.step_s <= limits.noise.longest_constant_s)
+    leave_moving_rows_out(s);
   accuse(s);
   // again around the accusations, with neighbours that are not accused
   set_neighbours(s.track, s.pack, reference_of(s), s.channels.are_mostly_held());

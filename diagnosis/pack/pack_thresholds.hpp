@@ -73,9 +73,10 @@ struct PackThresholds {
     double quiet_c = 0.01;                    ///< [C] step of the current below which second differences show the noise
     double white_v = 0.001;                   ///< if there are too few quiet rows
     double fast_v = 0.0005, slow_v = 0.0005;  ///< starting values
-    double unknown_edge = 5;   ///< factor on edge_share, as learned, from which on the current of a reading is unknown
-    double edge_share = 0.01;  ///< of R0 times a step of the current: error at the step, before it is learned
-    double ocv_axis = 0.001;   ///< error of the OCV's SOC axis between cells
+    double unknown_edge = 5;  ///< factor on edge_share, as learned, from which on the current of a reading is unknown
+    double longest_constant_s = 10;  ///< between rows with equal currents, for a current that was constant
+    double edge_share = 0.01;        ///< of R0 times a step of the current: error at the step, before it is learned
+    double ocv_axis = 0.001;         ///< error of the OCV's SOC axis between cells
     double lowest_soc = 0.04, highest_soc = 0.98;  ///< beyond, the curve of the cell file is not to be trusted:
     double beyond_axis = 0.5;                      ///< error of the axis as a share of the distance
     double beyond_resistance = 20;                 ///< relative error of the resistances over the distance
