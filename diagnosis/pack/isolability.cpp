@@ -133,7 +133,7 @@ std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vect
   const Data d = data_of(information, healthy, nullptr);
   std::vector<PackLimit> list;
   for (const Cause cause : cell_causes) {
-    const double least = likelihood.least()[parameter_of(cause)];
+    const double least = likelihood.least()[static_cast<Eigen::Index>(parameter_of(cause))];
     // the gain is a square of the size minus a constant
     const auto gain_at = [&](double size) {
       const Eigen::VectorXd with_data = d.information.col(place_of(cause)) * size;
