@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "diagnosis/denoise_current.hpp"
+#include "diagnosis/idle_reading.hpp"
 #include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
@@ -27,6 +28,7 @@ LikelihoodModel likelihood_model_of(const model::CellParameters<>& cell,
   const model::CellParameters<> judged = learned.applied(cell);
   const NoiseModel noise = nominal_noise(records, judged);
   for (PreparedRecording& r : records) {
+    if (r.checks.empty()) add_idle_checks(r, judged);
     const double at_most_a = thresholds.denoising.noise_times_file * cell.noise.current_a;
     r.current_a = denoise_current(r.current_a, std::min(current_noise(r.current_a), at_most_a));
   }

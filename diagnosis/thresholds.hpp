@@ -292,6 +292,19 @@ struct Thresholds {
     double meter_c = 3e-5;                  ///< [C] of a trusted ammeter
   };
 
+  /// What the current sensor reads in rests after a discharge (idle_reading.hpp).
+  struct IdleReading {
+    double settled_s = 10;                 ///< [s] of a rest at its start, where a filtered channel may still move
+    std::size_t readings = 30;             ///< of a rest at least
+    std::size_t rests = 2;                 ///< at least
+    std::size_t zeros_of_no_reading = 10;  ///< exact zeros in a row: the instrument does not measure
+    double alike = 0.5;                    ///< of the reading by which the rests may differ
+    double charge_at_most = 0.05;          ///< of the capacity, in all rests: more is charged
+    double true_current_c = 2e-4;   ///< [C] standard deviation of what may really flow: a charge of 1 % in 50 h that
+                                    ///< nobody wants
+    double resolution_share = 0.3;  ///< of the sensor's step, standard deviation of a mean of few different readings
+  };
+
   /// The next experiment.
   struct Design {
     double separates = 40;      ///< expected gain from which two hypotheses are separated: more than
@@ -363,6 +376,7 @@ struct Thresholds {
   ResidualTest residual;
   Location location;
   References references;
+  IdleReading idle_reading;
   Design design;
   Healthy healthy;
   ModelTolerance model_tolerance;
