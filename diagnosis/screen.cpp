@@ -49,7 +49,8 @@ void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   const Eigen::VectorXd found = regular.ldlt().solve(toward(p));  // its best strengths, to first order
   double gain = std::max(0.0, toward(p).dot(found));
   const model::Parameter& first = model::catalogue[mechanism].parameter[p.parameters[0]];
-  const bool one_sided = first.low >= 0 && first.role == Role::strength;
+  const double lowest = knowledge_of(mechanism).bounds(p.parameters[0], {first.low, first.high}, 0).low;
+  const bool one_sided = lowest >= 0 && first.role == Role::strength;
   if (one_sided && found[0] + p.setting.value[p.parameters[0]] < 0) gain = 0;
   const std::size_t unknowns = p.parameters.size() + (is_searched(mechanism, capacity_ah) ? 1 : 0);
   gain -= (static_cast<double>(unknowns) - 1) * screening_limits.per_unknown;

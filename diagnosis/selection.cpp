@@ -16,10 +16,27 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
+/// Standard deviation of one estimated parameter over its own, with the parameters of `known` mechanisms held: the
+/// resistance of a polarisation and an energy that scales it have a well-known product.
+double share_of_deviation(const HypothesisFit& f, std::size_t parameter, const std::set<std::size_t>& known) {
+  const std::vector<ParameterRef> sought = f.hypothesis.sought();
+  const auto index = [&](std::size_t j) { return f.hypothesis.settings[sought[j].setting].index; };
+  std::vector<Eigen::Index> held;
+  for (std::size_t k = 0; k < sought.size(); ++k) {
+    if (known.contains(index(k)) && index(k) != index(parameter)) held.push_back(static_cast<Eigen::Index>(k));
+  }
+  const auto j = static_cast<Eigen::Index>(parameter);
+  if (held.empty() || !f.covariance.allFinite() || !(f.covariance(j, j) > 0)) return 1;
+  const Eigen::MatrixXd of_held = f.covariance(held, held);
+  const Eigen::VectorXd with_held = f.covariance(held, j);
+  const double follows = with_held.dot(of_held.ldlt().solve(with_held)) / f.covariance(j, j);
+  return std::isfinite(follows) ? std::sqrt(std::clamp(1 - follows, 0.0, 1.0)) : 1;
+}
+
 /// Returns true if a mechanism's own strength does not carry it: each of its strengths, or the first one if the others
 /// mean nothing without it, is at a bound or within two of its standard deviations of none. One without a standard
-/// deviation was searched, and counts.
-bool is_weak(const HypothesisFit& f, std::size_t mechanism) {
+/// deviation was searched, and counts. certain: mechanisms that are there in any case, at whatever size.
+bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain = {}) {
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
   bool has_strength = false;
   for (std::size_t j = 0; j < sought.size(); ++j) {
@@ -28,7 +45,8 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism) {
     if (s.index != mechanism || p.role != model::Role::strength) continue;
     if (sought[j].parameter > 0 && knowledge_of(mechanism).needs_first_strength) continue;
     has_strength = true;
-    const double value = s.value[sought[j].parameter], sigma = s.deviation[sought[j].parameter];
+    const double value = s.value[sought[j].parameter],
+                 sigma = s.deviation[sought[j].parameter] * share_of_deviation(f, j, certain);
     const bool known = std::isfinite(sigma) && sigma > 0;
     if (f.at_bound[j] == 0 && (!known || std::abs(value) >= selection_limits.own_sigmas * sigma)) return false;
   }
@@ -91,8 +109,8 @@ class Elimination {
       const bool alone = found_.best.hypothesis.added().size() == 1;
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
-      const bool credible = !is_weak(found_.best, m) && !is_implausible(found_.best, m);
-      if (gain < selection_limits.detected || !credible || !(alone || counts(gain, all_gain, rms_v.at(m))))
+      const bool credible = is_credible(m);
+      if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
         reduced.emplace_back(gain, without);
       else if (compare_with_rivals(m, without))
         return true;
@@ -113,6 +131,16 @@ class Elimination {
   }
 
  private:
+  /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
+  bool is_credible(std::size_t m) const {
+    return scope_.expected.contains(m) || (!is_weak(found_.best, m, scope_.expected) && !is_implausible(found_.best, m));
+  }
+
+  /// The cell file may contain what is certain in other tables, and has a small error then.
+  bool is_too_large(std::size_t m, double rms_v) const {
+    return !scope_.expected.contains(m) && rms_v > selection_limits.larger_than_error * error_v_;
+  }
+
   /// The rounds are limited, and end with mechanisms that may not stay: one that is larger than the error, which
   /// another one cancels, or one without a strength of its own. Of two that cancel each other one stays, with the other
   /// as its rival: the recordings know their sum alone. Returns false if all may stay.
@@ -121,8 +149,8 @@ class Elimination {
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
     std::size_t worst = no_mechanism;
     for (const std::size_t m : added) {
-      const bool too_large = added.size() > 1 && rms_v.at(m) > selection_limits.larger_than_error * error_v_;
-      if (!too_large && !is_weak(found_.best, m) && !is_implausible(found_.best, m)) continue;
+      const bool too_large = added.size() > 1 && is_too_large(m, rms_v.at(m));
+      if (!too_large && is_credible(m)) continue;
       if (worst == no_mechanism || rms_v.at(m) > rms_v.at(worst)) worst = m;
     }
     if (worst == no_mechanism) return false;
@@ -132,7 +160,9 @@ class Elimination {
     found_.gains.clear();
     if (partner != no_mechanism) {
       HypothesisFit swapped = search_.without_one(found_.best, partner);
-      const bool swap = search_.score(swapped) < search_.score(without);
+      const bool swap = scope_.expected.contains(worst) != scope_.expected.contains(partner)
+                            ? scope_.expected.contains(worst)
+                            : search_.score(swapped) < search_.score(without);
       const std::size_t kept = swap ? worst : partner, other = swap ? partner : worst;
       if (swap) std::swap(swapped, without);
       found_.rivals[kept].push_back(std::move(swapped));
@@ -144,10 +174,10 @@ class Elimination {
 
   /// One of several mechanisms must be seen, and must not be larger than the error: such ones cancel each other. Of
   /// these the one goes that is missed less.
-  bool counts(double gain, double all_gain, double rms_v) const {
+  bool counts(std::size_t m, double gain, double all_gain, double rms_v) const {
     const bool seen =
         rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
-    return seen && rms_v <= selection_limits.larger_than_error * error_v_;
+    return seen && !is_too_large(m, rms_v);
   }
 
   /// Returns true if a rival, or the same mechanisms from another start, has become the best.

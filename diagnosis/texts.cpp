@@ -148,9 +148,14 @@ std::string causes_text(const Diagnosis& d, const RecordingFacts& facts) {
     part += rivals.empty() ? ")" : "; or " + joined(rivals, "or") + ")";
     parts.push_back(std::move(part));
   }
-  return fmt::format("{} {} together explain {} of it, {} remain: {}. Begin with the first: {}", model_error(facts),
-                     count[std::min(parts.size(), count.size() - 1)], percent(d.explained_share),
-                     millivolts(d.unexplained_rmse_v), joined(parts, "and"),
+  const std::string_view number = count[std::min(parts.size(), count.size() - 1)];
+  const std::string explained =
+      d.explained_share < text_style.explained_by_tables
+          ? fmt::format("{} act, whose effects on this recording its tables contain, and {} remain", number,
+                        millivolts(d.unexplained_rmse_v))
+          : fmt::format("{} together explain {} of it, {} remain", number, percent(d.explained_share),
+                        millivolts(d.unexplained_rmse_v));
+  return fmt::format("{} {}: {}. Begin with the first: {}", model_error(facts), explained, joined(parts, "and"),
                      text_of_mechanism(d.findings.front().setting.index).action);
 }
 

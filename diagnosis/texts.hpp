@@ -32,6 +32,7 @@ struct TextStyle {
   std::size_t limits_named = 3;         ///< detection limits
   std::size_t spans_named_at_most = 3;  ///< more spans than this are not a place
   std::size_t causes_in_full = 2;       ///< the others by name: a sentence must end
+  double explained_by_tables = 0.1;     ///< share below which the tables of the cell file contain what was found
   double nearest_explains = 0.2;        ///< share from which the nearest mechanism of an unknown cause is named
   double rest_named_s = 60;             ///< shorter rests do not count
 };

@@ -29,6 +29,10 @@ struct Knowledge<model::ContactStep> : DefaultKnowledge<model::ContactStep> {
                        size_text(s, contact_resistance));
   }
   static std::optional<std::string> not_testable(const TestConditions& c) { return needs_current(c); }
+  /// No contact becomes better by itself: what looks like it is an error of the cell file's resistance.
+  static Bounds bounds(std::size_t parameter, Bounds file, double /*rc_s*/) {
+    return parameter == contact_resistance ? Bounds{0, file.high} : file;
+  }
   static bool carry_over(MechanismSetting& s) {
     s.value[contact_onset] = 0;
     return true;

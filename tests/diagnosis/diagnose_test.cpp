@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <set>
 
 #include <gmock/gmock.h>
 
@@ -237,8 +238,9 @@ TEST(Diagnose, AGrossErrorIsNeverHealthy) {
   EXPECT_NE(d.verdict, Verdict::no_mismatch);
 }
 
-/// Offset and gain of the voltage cancel on the flat part of the curve: the recording knows their sum alone.
-TEST(Diagnose, OfTwoThatCancelOneIsNamedWithTheOtherAsItsRival) {
+/// What is left of an offset and a gain of the voltage that cancel on the flat part of the curve. expected: certain
+/// before any voltage is looked at.
+Survivors left_of_two_that_cancel(const std::set<std::size_t>& expected) {
   const LikelihoodModel made(
       test::table9(), {},
       {test::recorded(test::drive(2, 44), 0.7, 44, [](std::size_t, double, double) { return 0.015; })}, {});
@@ -252,8 +254,14 @@ TEST(Diagnose, OfTwoThatCancelOneIsNamedWithTheOtherAsItsRival) {
   both.settings[0].value[0] = 0.1;
   both.settings[1].value[0] = -0.027;
   const HypothesisFit fit = likelihood.fit(both, control.calibration, 1);
-  const Scope scope = scope_of(likelihood);
-  const Survivors survivors = eliminate(search, likelihood, control, fit, scope);
+  Scope scope = scope_of(likelihood);
+  scope.expected = expected;
+  return eliminate(search, likelihood, control, fit, scope);
+}
+
+/// The recording knows their sum alone.
+TEST(Diagnose, OfTwoThatCancelOneIsNamedWithTheOtherAsItsRival) {
+  const Survivors survivors = left_of_two_that_cancel({});
   const std::vector<std::size_t> left = survivors.best.hypothesis.added();
   ASSERT_EQ(left.size(), 1U);
   const std::size_t other = left.front() == model::mechanism_index("voltage_offset")
@@ -262,6 +270,13 @@ TEST(Diagnose, OfTwoThatCancelOneIsNamedWithTheOtherAsItsRival) {
   ASSERT_TRUE(survivors.rivals.contains(left.front()));
   EXPECT_THAT(survivors.rivals.at(left.front()),
               Contains(testing::Truly([&](const HypothesisFit& f) { return f.hypothesis.find(other) != nullptr; })));
+}
+
+TEST(Diagnose, OfTwoThatCancelTheOneThatIsCertainStays) {
+  for (const char* id : {"voltage_offset", "voltage_gain"}) {
+    const std::size_t certain = model::mechanism_index(id);
+    EXPECT_THAT(left_of_two_that_cancel({certain}).best.hypothesis.added(), ElementsAre(certain));
+  }
 }
 
 TEST(Diagnose, WhenStoppedItSaysWhatIsKnownSoFar) {
