@@ -28,7 +28,7 @@ std::vector<double> readings_of(const PreparedRecording& r, const measurement::R
     while (zeros_end < rest.end && r.current_a[zeros_end] == 0) ++zeros_end;
     const bool off = zeros_end - k >= idle_limits.zeros_of_no_reading;
     for (const std::size_t end = std::max(zeros_end, k + 1); k < end; ++k) {
-      if (!off && r.time_s[k] - r.time_s[rest.begin] >= idle_limits.settled_s) read_a.push_back(r.current_a[k]);
+      if (!off && r.time_s[k] - r.time_s[rest.begin] >= idle_limits.beginning_s) read_a.push_back(r.current_a[k]);
     }
   }
   return read_a;

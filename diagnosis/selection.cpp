@@ -16,20 +16,20 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
-/// Standard deviation of one estimated parameter over its own, with the parameters of `known` mechanisms held: the
+/// Standard deviation of one estimated parameter over its own, with the parameters of `known` mechanisms fixed: the
 /// resistance of a polarisation and an energy that scales it have a well-known product.
 double share_of_deviation(const HypothesisFit& f, std::size_t parameter, const std::set<std::size_t>& known) {
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
   const auto index = [&](std::size_t j) { return f.hypothesis.settings[sought[j].setting].index; };
-  std::vector<Eigen::Index> held;
+  std::vector<Eigen::Index> fixed;
   for (std::size_t k = 0; k < sought.size(); ++k) {
-    if (known.contains(index(k)) && index(k) != index(parameter)) held.push_back(static_cast<Eigen::Index>(k));
+    if (known.contains(index(k)) && index(k) != index(parameter)) fixed.push_back(static_cast<Eigen::Index>(k));
   }
   const auto j = static_cast<Eigen::Index>(parameter);
-  if (held.empty() || !f.covariance.allFinite() || !(f.covariance(j, j) > 0)) return 1;
-  const Eigen::MatrixXd of_held = f.covariance(held, held);
-  const Eigen::VectorXd with_held = f.covariance(held, j);
-  const double follows = with_held.dot(of_held.ldlt().solve(with_held)) / f.covariance(j, j);
+  if (fixed.empty() || !f.covariance.allFinite() || !(f.covariance(j, j) > 0)) return 1;
+  const Eigen::MatrixXd of_fixed = f.covariance(fixed, fixed);
+  const Eigen::VectorXd with_fixed = f.covariance(fixed, j);
+  const double follows = with_fixed.dot(of_fixed.ldlt().solve(with_fixed)) / f.covariance(j, j);
   return std::isfinite(follows) ? std::sqrt(std::clamp(1 - follows, 0.0, 1.0)) : 1;
 }
 
@@ -104,20 +104,26 @@ class Elimination {
     found_.gains.clear();
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
     const double all_gain = search_.gain(control_, found_.best);
-    std::vector<std::pair<double, HypothesisFit>> reduced;  // without those that are not needed, by their gain
+    struct Reduced {
+      bool certain;  // the mechanism that it lacks
+      double gain;   // of that mechanism
+      HypothesisFit fit;
+    };
+    std::vector<Reduced> reduced;  // without those that are not needed
     for (const std::size_t m : found_.best.hypothesis.added()) {
       const bool alone = found_.best.hypothesis.added().size() == 1;
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
       const bool credible = is_credible(m);
       if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
-        reduced.emplace_back(gain, without);
+        reduced.push_back({scope_.expected.contains(m), gain, without});
       else if (compare_with_rivals(m, without))
         return true;
     }
     if (reduced.empty()) return false;
-    std::sort(reduced.begin(), reduced.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    found_.best = reduced.front().second;
+    found_.best = std::min_element(reduced.begin(), reduced.end(), [](const Reduced& a, const Reduced& b) {
+                    return std::pair(a.certain, a.gain) < std::pair(b.certain, b.gain);
+                  })->fit;
     return true;
   }
 
@@ -133,7 +139,8 @@ class Elimination {
  private:
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
   bool is_credible(std::size_t m) const {
-    return scope_.expected.contains(m) || (!is_weak(found_.best, m, scope_.expected) && !is_implausible(found_.best, m));
+    return scope_.expected.contains(m) ||
+           (!is_weak(found_.best, m, scope_.expected) && !is_implausible(found_.best, m));
   }
 
   /// The cell file may contain what is certain in other tables, and has a small error then.

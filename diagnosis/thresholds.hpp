@@ -294,7 +294,7 @@ struct Thresholds {
 
   /// What the current sensor reads in rests after a discharge (idle_reading.hpp).
   struct IdleReading {
-    double settled_s = 10;                 ///< [s] of a rest at its start, where a filtered channel may still move
+    double beginning_s = 10;               ///< [s] of a rest at its start, where a filtered channel may still move
     std::size_t readings = 30;             ///< of a rest at least
     std::size_t rests = 2;                 ///< at least
     std::size_t zeros_of_no_reading = 10;  ///< exact zeros in a row: the instrument does not measure
