@@ -87,7 +87,7 @@ TEST(PackSamplingTimes, AreUnknownIfTheCurrentChangesSeveralTimesWithinARow) {
   const dp::PackRecording fast = recording_of(Current(2, 6, 10.0 * rows), 10, 0.5, 5);
   EXPECT_FALSE(span_in(fast));
   EXPECT_FALSE(dp::steps_stand_alone(track_of(fast), fast));
-  const dp::PackRecording some_alone = recording_of(Current(0.3, 5, rows), 1, 0.05, 0.5);
+  const dp::PackRecording some_alone = recording_of(Current(0.3, 3, rows), 1, 0.05, 0.5);
   EXPECT_FALSE(dp::steps_stand_alone(track_of(some_alone), some_alone));
   const dp::PackRecording slow = recording_of(Current(5, 20, rows), 1, 0.05, 0.5);
   EXPECT_TRUE(dp::steps_stand_alone(track_of(slow), slow));
