@@ -11,7 +11,9 @@ namespace {
 
 constexpr std::size_t fewest_readings = 4;  ///< of a mean or a trend
 constexpr double far_sigmas = 2;            ///< from a line, from which on a reading counts less
-constexpr double own_share = 0.5;           ///< of the stated sigmas that is at least not common to all readings
+constexpr std::size_t fewest_after =
+    4;  ///< readings after an onset: of fewer, a single one that is far off would make a line
+constexpr double own_share = 0.5;  ///< of the stated sigmas that is at least not common to all readings
 
 double log_beta(double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); }
 
@@ -165,7 +167,7 @@ std::optional<Onset> onset_of(const std::vector<Reading>& readings, double scatt
   const HingeFit constant = hinge_at(readings, weight, readings.back().day + 1);
   HingeFit best;
   Onset onset;
-  for (std::size_t k = 0; k + 2 < readings.size(); ++k) {
+  for (std::size_t k = 0; k + fewest_after < readings.size(); ++k) {
     const HingeFit fit = hinge_at(readings, weight, readings[k].day - (k == 0 ? 1 : 0));
     if (fit.cost >= best.cost) continue;
     best = fit;
