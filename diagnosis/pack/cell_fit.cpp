@@ -100,8 +100,9 @@ struct Grown {
 Grown grown_of(const Vector& theta, double warm_k) {
   const double law = std::max(0.0, limits.self_heating.per_k + theta[heating]), growth = theta[resistance],
                divisor = 1 + law * warm_k * (1 + growth);
+  // at its end the law does not change with its parameter
   return {growth / divisor, (1 + law * warm_k) / (divisor * divisor),
-          -warm_k * growth * (1 + growth) / (divisor * divisor)};
+          law > 0 ? -warm_k * growth * (1 + growth) / (divisor * divisor) : 0};
 }
 
 /// Sets the columns of the OCV curve's shape; returns what theta says of it.
