@@ -9,6 +9,7 @@
 
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::benchmark {
 
@@ -84,13 +85,14 @@ PlantedOutcome outcome_of(const truth::PackFault& fault, const dp::PackDiagnosis
 struct Count {
   std::size_t planted = 0, named = 0, listed = 0, foretold = 0, another = 0, missed = 0, below = 0, sized = 0;
   std::vector<double> after_s;
+  std::vector<double> ratios;  ///< found over planted
 };
 
-std::string row_of(const std::string& name, Count c) {
-  std::sort(c.after_s.begin(), c.after_s.end());
-  const std::string time = c.after_s.empty() ? "" : fmt::format("{:.0f} min", c.after_s[c.after_s.size() / 2] / 60);
-  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed,
-                     c.foretold, c.another, c.missed, c.below, c.sized, time);
+std::string row_of(const std::string& name, const Count& c) {
+  const std::string time = c.after_s.empty() ? "" : fmt::format("{:.0f} min", measurement::median(c.after_s) / 60),
+                    ratio = c.ratios.empty() ? "" : fmt::format("{:.2f}", measurement::median(c.ratios));
+  return fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", name, c.planted, c.named, c.listed,
+                     c.foretold, c.another, c.missed, c.below, c.sized, ratio, time);
 }
 
 }  // namespace
@@ -142,6 +144,7 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
         c->missed += !found && !p.cell_right ? 1 : 0;
         c->below += p.below ? 1 : 0;
         c->sized += p.named && std::abs(p.pull) <= 2 ? 1 : 0;
+        if (p.named && p.fault.size != 0) c->ratios.push_back(p.found / p.fault.size);
         if (p.named && p.after_s > 0) c->after_s.push_back(p.after_s);
       }
     }
@@ -150,8 +153,8 @@ std::string pack_table(const std::vector<PackOutcome>& outcomes) {
   std::string text =
       "| planted | cases | cell and cause right | AMBIGUOUS, right one listed | of these, not separable by the matrix "
       "| another cause for this cell | missed | of these two, below the stated limit | right, size within 2 sigma "
-      "| median time to name |\n"
-      "|---|---|---|---|---|---|---|---|---|---|\n";
+      "| the same, found over planted, median | median time to name |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n";
   for (const auto& [id, count] : by_cause) text += row_of("`" + id + "`", count);
   text += row_of("**physics and sensors**", all) + row_of("**faults of the data**", data);
   text += fmt::format(

@@ -1,6 +1,7 @@
 // Diagnoses simulated packs (truth/packs.hpp) and scores the answers.
 //
-//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--reversed] [--json FILE] [--readme FILE] [--write FOLDER]
+//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--only FAULT] [--reversed] [--json FILE] [--readme FILE]
+//              [--write FOLDER]
 #include <atomic>
 #include <filesystem>
 #include <mutex>
@@ -28,7 +29,7 @@ struct Options {
   std::size_t faulty = 60, healthy = 60, first = 0;
   unsigned jobs = 1;
   bool no_shared = false, reversed = false;
-  std::string json, readme, write;
+  std::string json, only, readme, write;
 };
 
 bms::measurement::Recording recording_of(const truth::PackSeries& s) {
@@ -88,7 +89,7 @@ void run(const Options& o) {
     for (std::size_t k = next++; k < count; k = next++) {
       const bool healthy = k >= o.faulty;
       const std::size_t index = o.first + (healthy ? k - o.faulty : k);
-      truth::PackCase c = truth::make_pack(o.seed, index, healthy);
+      truth::PackCase c = truth::make_pack(o.seed, index, healthy, o.only);
       if (o.reversed) reverse(c);
       if (!o.write.empty()) write_case(o.write, index, c);
       outcomes[k] = run_pack(c, !o.no_shared);
@@ -116,6 +117,7 @@ int main(int argc, char** argv) {
   app.add_option("--faulty", o.faulty, "packs with one to three faults")->capture_default_str();
   app.add_option("--healthy", o.healthy, "packs without")->capture_default_str();
   app.add_option("--first", o.first, "index of the first pack")->capture_default_str();
+  app.add_option("--only", o.only, "plant a single fault with this id in each pack")->type_name("FAULT");
   app.add_option("--jobs", o.jobs, "packs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
   app.add_flag("--no-shared", o.no_shared, "do not diagnose the mean of the cells: faster");
   app.add_flag("--reversed", o.reversed, "reverse the sign of every current sensor");

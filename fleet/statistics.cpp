@@ -10,19 +10,24 @@ namespace bms::fleet {
 namespace {
 
 constexpr std::size_t fewest_readings = 4;  ///< of a mean or a trend
-constexpr double own_share = 0.5;           ///< of the stated sigmas that is at least not common to all readings
+constexpr double far_sigmas = 2;            ///< from a line, from which on a reading counts less
+constexpr std::size_t fewest_after =
+    4;  ///< readings after an onset: of fewer, a single one that is far off would make a line
+constexpr double own_share = 0.5;  ///< of the stated sigmas that is at least not common to all readings
 
 double log_beta(double a, double b) { return std::lgamma(a) + std::lgamma(b) - std::lgamma(a + b); }
 
 double log_choose(double n, double k) { return std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1); }
 
-/// Straight line or constant through points after a day, by weighted least squares.
+/// Straight line or constant through points after a day. A reading that is far off counts in proportion to its
+/// distance, not to the square of it (Huber 1964): one bad day must not hide a change, nor make one.
 struct HingeFit {
   double before = 0, per_day = 0, cost = std::numeric_limits<double>::infinity();
+  double at(double since) const { return before + per_day * since; }
 };
 
-HingeFit hinge_at(const std::vector<Reading>& readings, const std::vector<double>& weight, double onset) {
-  double w = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+HingeFit weighted_hinge(const std::vector<Reading>& readings, const std::vector<double>& weight, double onset) {
+  double w = 0, x = 0, y = 0, xx = 0, xy = 0;
   for (std::size_t k = 0; k < readings.size(); ++k) {
     const double since = std::max(0.0, readings[k].day - onset), value = readings[k].value;
     w += weight[k];
@@ -30,13 +35,29 @@ HingeFit hinge_at(const std::vector<Reading>& readings, const std::vector<double
     y += weight[k] * value;
     xx += weight[k] * since * since;
     xy += weight[k] * since * value;
-    yy += weight[k] * value * value;
   }
   HingeFit fit;
   const double spread = xx - x * x / w;
   fit.per_day = spread > 0 ? (xy - x * y / w) / spread : 0;
   fit.before = (y - fit.per_day * x) / w;
-  fit.cost = yy - y * y / w - fit.per_day * fit.per_day * spread;
+  return fit;
+}
+
+HingeFit hinge_at(const std::vector<Reading>& readings, const std::vector<double>& weight, double onset) {
+  constexpr int rounds = 12;
+  std::vector<double> now = weight;
+  HingeFit fit;
+  for (int round = 0; round < rounds; ++round) {
+    fit = weighted_hinge(readings, now, onset);
+    fit.cost = 0;
+    for (std::size_t k = 0; k < readings.size(); ++k) {
+      const double since = std::max(0.0, readings[k].day - onset);
+      const double sigmas = std::sqrt(weight[k]) * std::abs(readings[k].value - fit.at(since));
+      const bool is_far = sigmas > far_sigmas;
+      fit.cost += is_far ? far_sigmas * (2 * sigmas - far_sigmas) : sigmas * sigmas;
+      now[k] = is_far ? weight[k] * far_sigmas / sigmas : weight[k];
+    }
+  }
   return fit;
 }
 
@@ -146,7 +167,7 @@ std::optional<Onset> onset_of(const std::vector<Reading>& readings, double scatt
   const HingeFit constant = hinge_at(readings, weight, readings.back().day + 1);
   HingeFit best;
   Onset onset;
-  for (std::size_t k = 0; k + 2 < readings.size(); ++k) {
+  for (std::size_t k = 0; k + fewest_after < readings.size(); ++k) {
     const HingeFit fit = hinge_at(readings, weight, readings[k].day - (k == 0 ? 1 : 0));
     if (fit.cost >= best.cost) continue;
     best = fit;

@@ -1,7 +1,7 @@
 #include "benchmark/truth/pack_faults.hpp"
 
 #include <algorithm>
-#include <string_view>
+#include <stdexcept>
 
 namespace bms::benchmark::truth {
 
@@ -59,7 +59,12 @@ bool may_share(const PackFault& a, const PackFault& b) {
 
 }  // namespace
 
-std::vector<PackFault> draw_pack_faults(const PackSetting& setting, plant::Random& random) {
+std::vector<PackFault> draw_pack_faults(const PackSetting& setting, std::string_view only, plant::Random& random) {
+  constexpr int most_draws = 10'000;
+  for (int n = 0; !only.empty() && n < most_draws; ++n) {
+    if (const PackFault fault = draw_fault(setting, random); fault.id == only) return {fault};
+  }
+  if (!only.empty()) throw std::invalid_argument("this pack cannot have the fault " + std::string(only));
   std::vector<PackFault> faults;
   const std::size_t count = 1 + below(random, 3);
   while (faults.size() < count) {

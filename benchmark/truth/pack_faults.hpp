@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <string_view>
 #include <vector>
 
 #include "benchmark/truth/packs.hpp"
@@ -16,8 +17,8 @@ struct PackSetting {
   bool long_recording = false;  ///< days: self-discharge is visible
 };
 
-/// One to three faults, mostly of different cells.
-std::vector<PackFault> draw_pack_faults(const PackSetting& setting, plant::Random& random);
+/// One to three faults, mostly of different cells. only: one fault with this id; throws if this pack cannot have it.
+std::vector<PackFault> draw_pack_faults(const PackSetting& setting, std::string_view only, plant::Random& random);
 
 /// Whether this cell has this fault, and its size; 0 if not.
 double size_of(const std::vector<PackFault>& faults, const char* id, std::size_t cell);

@@ -219,7 +219,7 @@ std::vector<PackFault> measurable(const Build& b, std::vector<PackFault> faults,
 
 }  // namespace
 
-PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
+PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only) {
   const std::uint64_t own = derived_seed(derived_seed(seed, 0x9AC4), 2 * index + (healthy ? 1 : 0));
   plant::Random random(own);
   const Build b = draw_build(own, random);
@@ -227,7 +227,7 @@ PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy) {
   c.name = "pack " + std::to_string(index + 1) + (healthy ? " healthy" : "");
   c.cell = calibrate(b.cell, b.lab.calibration_share, random);
   c.given_initial_soc = b.start_soc + c.cell.initial_soc_tolerance * between(random, -0.6, 0.6);
-  if (!healthy) c.faults = draw_pack_faults(b.setting, random);
+  if (!healthy) c.faults = draw_pack_faults(b.setting, only, random);
   const std::size_t cells = b.setting.cells, sensors = b.setting.sensors;
   std::vector<double> sum_v, leaks;
   c.recording.sensor_c.resize(sensors);

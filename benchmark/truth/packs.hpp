@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "benchmark/truth/cases.hpp"
@@ -41,7 +42,8 @@ struct PackCase {
   double hours = 0;
 };
 
-PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy);
+/// only: of a pack that is not healthy: a single fault with this id.
+PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {});
 
 /// Columns time_s, current_a, v_1 .., t_1 .., pack_voltage_v.
 std::string csv_of(const PackSeries& series);

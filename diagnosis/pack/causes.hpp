@@ -22,6 +22,7 @@ enum Parameter : std::size_t {
   slope,          ///< by the voltage around its mean: curves of healthy cells differ; a gain error also shifts the mean
   delay,          ///< of the voltage channel against the neighbours [s]
   temperature,    ///< change of the resistances per kelvin of difference to the mean of the sensors [1/K]
+  heating,        ///< change of the resistances per kelvin by which a grown one warms its cell, minus the usual [1/K]
   blur,           ///< response to changes of the current within a few rows: not read at the moment of the neighbours
   shape_1,        ///< the OCV curve of this cell differs by cos(pi soc) [V]
   shape_2,        ///< ... by cos(2 pi soc)

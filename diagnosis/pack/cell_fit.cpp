@@ -92,6 +92,19 @@ void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di
   noise.white_v2[k] = delayed.share_of_step * (1 - delayed.share_of_step) * square(delayed.step_v / edge);
 }
 
+/// What is left of a grown resistance in a cell that it warms up, and the derivatives.
+struct Grown {
+  double share, by_growth, by_law;
+};
+
+Grown grown_of(const Vector& theta, double warm_k) {
+  const double law = std::max(0.0, limits.self_heating.per_k + theta[heating]), growth = theta[resistance],
+               divisor = 1 + law * warm_k * (1 + growth);
+  // at its end the law does not change with its parameter
+  return {growth / divisor, (1 + law * warm_k) / (divisor * divisor),
+          law > 0 ? -warm_k * growth * (1 + growth) / (divisor * divisor) : 0};
+}
+
 /// Sets the columns of the OCV curve's shape; returns what theta says of it.
 double set_shapes(double soc, const Vector& theta, Eigen::Ref<Eigen::RowVectorXd> row) {
   const double wave = std::cos(std::numbers::pi * soc);
@@ -133,9 +146,11 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     row[charge] = slope_v;
     row[capacity] = slope_v * (t.soc[then] - t.soc.front());
     row[leak] = -slope_v * t.days[then];
-    row[resistance] = all_v;
+    const Grown grown = grown_of(theta, t.warm_k[then]);
+    row[resistance] = grown.by_growth * all_v;
+    row[heating] = grown.by_law * all_v;
     row[polarisation] = own.v[then];
-    row[time_constant] = (1 + theta[resistance] + theta[polarisation]) * own.by_tau_v[then];
+    row[time_constant] = (1 + grown.share + theta[polarisation]) * own.by_tau_v[then];
     row[tilt] = (t.soc[then] - 0.5) * all_v;
     row[joint] = current_a;
     row[offset] = 1;
@@ -147,7 +162,7 @@ Linearised linearise(const FitInput& input, const Vector& theta, double edge) {
     const double course_v = (to.r0_ohm / from.r0_ohm - 1) * t.r0_by_row_ohm[then] * current_a +
                             (to.r1_ohm / from.r1_ohm - 1) * t.v_rc_v[then];
     const double shape_v = set_shapes(t.soc[then] + dz, theta, row);
-    const double explained_v = to.ocv_v - from.ocv_v + course_v + theta[blur] * row[blur] + theta[resistance] * all_v +
+    const double explained_v = to.ocv_v - from.ocv_v + course_v + theta[blur] * row[blur] + grown.share * all_v +
                                theta[polarisation] * own.v[then] + own.v[then] - t.v_rc_v[then] +
                                theta[tilt] * row[tilt] + theta[joint] * current_a + theta[offset] +
                                theta[gain] * late.v + theta[slope] * row[slope] + late.v - t.smooth_v[k] +

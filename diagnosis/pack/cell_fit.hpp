@@ -2,9 +2,13 @@
 //
 //   v_cell(t) - v_neighbours(t) = p(t; theta) + noise        theta: the parameters of causes.hpp
 //
-//   p = OCV(z + dz) - OCV(z) + (R0(z + dz) - R0(z)) I + resistance (R0 I + v_rc) + polarisation v_rc + joint I
+//   p = OCV(z + dz) - OCV(z) + (R0(z + dz) - R0(z)) I + h(resistance) (R0 I + v_rc) + polarisation v_rc + joint I
 //       + offset + gain v_neighbours + [v_neighbours(t - delay) - v_neighbours(t)] + blur R0 (I - mean of I around t)
 //   dz = charge + capacity (z(t) - z(0)) - leak t
+//   h(r) = r / (1 + a w(t) (1 + r))      of a cell that its higher resistance warms up
+//
+// The neighbours are warmer by w than at the start. A cell with (1 + h) times their resistance warms up (1 + h) times
+// as much, and its resistance falls by the share a for each kelvin: 1 + h = (1 + r) (1 - a w h), to first order.
 //
 // All causes of a cell share these columns. A hypothesis is a prior: a parameter that is healthy has the spread of the
 // pack's cells, a faulty one a wide spread. Its likelihood follows from two matrices, so that no hypothesis needs a fit

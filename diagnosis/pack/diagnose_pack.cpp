@@ -226,37 +226,41 @@ std::optional<double> named_after_s(const State& s, const PackLikelihood& likeli
   return since;
 }
 
-/// A cell with more resistance warms up more, and what it shows is less than what has grown. The size is that at the
-/// temperature of its neighbours, as far as it is known how the resistances follow the temperature.
-void add_self_heating(const State& s, PackFinding& f) {
-  const double warmer_k = measurement::mean(warmer_than_at_start(s.pack));
-  if (!(warmer_k > 0 && f.value > 0)) return;
-  const double hidden = (1 + f.value) * f.value * limits.self_heating.per_k * warmer_k;
-  f.value += hidden;
-  f.sigma = std::hypot(f.sigma, limits.self_heating.unknown * hidden);
+/// The one of two alike causes, resistance and joint, that is not named. They differ only in their course over charge
+/// and time, and the model knows this course badly.
+std::optional<Cause> alike_of(Cause cause) {
+  if (cause == Cause::resistance) return Cause::joint;
+  if (cause == Cause::joint) return Cause::resistance;
+  return std::nullopt;
 }
 
-/// A resistance and a joint differ only in their course over charge and time. What the one that is not named is beyond
-/// its healthy spread, of the same size as the named one, shows how badly the model knows this course.
-double taken_by_the_alike(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
-  if (a.cause != Cause::resistance && a.cause != Cause::joint) return 0;
-  const Cause other = a.cause == Cause::joint ? Cause::resistance : Cause::joint;
-  const double value = likelihood.size(s.accused, {other, a.cell}, likelihood.last_checkpoint()).value,
-               healthy = s.healthy[static_cast<Eigen::Index>(parameter_of(other))];
-  const double excess = std::max(0.0, std::abs(value) - limits.healthy_sigmas * healthy);
-  return a.cause == Cause::joint ? excess * s.track.r0_ohm : excess / s.track.r0_ohm;
+/// Size of an accusation. One that is alike is taken for exactly that of the neighbours: what it is within its healthy
+/// spread is part of the sigma, and what the recording says that it is beyond shows how badly the model knows the
+/// course.
+Estimated size_of(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
+  const std::optional<Cause> alike = alike_of(a.cause);
+  if (!alike) return likelihood.size(s.accused, a, likelihood.last_checkpoint());
+  const auto p = static_cast<Eigen::Index>(parameter_of(*alike));
+  const double to_named = a.cause == Cause::joint ? s.track.r0_ohm : 1 / s.track.r0_ohm;
+  const double value = likelihood.size(s.accused, {*alike, a.cell}, likelihood.last_checkpoint()).value;
+  const double beyond = std::max(0.0, std::abs(value) - limits.healthy_sigmas * s.healthy[p]);
+  Vector healthy = s.healthy;
+  healthy[p] *= limits.negligible;
+  const Estimated size = PackLikelihood(s.fits, healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s)
+                             .size(s.accused, a, likelihood.last_checkpoint());
+  return {size.value, std::hypot(size.sigma, to_named * s.healthy[p], to_named * beyond)};
 }
 
 PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const Accusation& a) {
   std::vector<Accusation> others = s.accused;
   std::erase(others, a);
   const std::size_t now = likelihood.last_checkpoint();
-  const Estimated size = likelihood.size(s.accused, a, now);
+  const Estimated size = size_of(s, likelihood, a);
   PackFinding f;
   f.cause = a.cause;
   f.cell = a.cell;
   f.value = size.value;
-  f.sigma = std::hypot(size.sigma, taken_by_the_alike(s, likelihood, a));
+  f.sigma = size.sigma;
   f.gain = likelihood.gain(others, a, now);
   double sum = 1;
   for (const Accusation& rival : likelihood.rivals_of(a)) {
@@ -289,7 +293,6 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
   std::stable_sort(f.rivals.begin(), f.rivals.end(),
                    [](const Rival& x, const Rival& y) { return x.probability > y.probability; });
   f.after_s = named_after_s(s, likelihood, others, a);
-  if (a.cause == Cause::resistance) add_self_heating(s, f);
   if (a.cause == Cause::capacity) {  // from 1 / capacity to capacity
     f.sigma /= (1 + f.value) * (1 + f.value);
     f.value = f.value / (1 + f.value);

@@ -45,8 +45,8 @@ Data data_of(const Matrix& information, const Vector& healthy, const Sensor* add
   if (added != nullptr) {
     Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
     for (const Eigen::Index p :
-         std::array<Eigen::Index, 13>{charge, capacity, leak, resistance, polarisation, time_constant, tilt, slope,
-                                      temperature, shape_1, shape_2, shape_3, shape_4})
+         std::array<Eigen::Index, 14>{charge, capacity, leak, resistance, polarisation, time_constant, tilt, slope,
+                                      temperature, heating, shape_1, shape_2, shape_3, shape_4})
       into(p, p) = added->cell ? 1 : 0;
     into(joint, joint) = added->joint ? 1 : 0;
     d.information += into.transpose() * information * into;

@@ -39,6 +39,7 @@ struct PackThresholds {
       {0.0005, 0, 0, 0, 8, 0},                  // slope: no cause of its own
       {0.01, 3, 0.1, 1, 1e6, 0.05},             // delay: channels may be read one after the other
       {0.02, 0, 0, 0, 3, 0},                    // temperature: 2 to 4 % per kelvin
+      {0.015, 0, 0, 0, 1, 0},                   // heating: the law, and how much of the warmth is the load's
       {0.02, 0, 0, 0, 50, 0, 0, 0, 0.5},        // blur: of R0; follows from the times at which channels are read
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},        // shapes of the OCV curve: healthy cells age differently
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
@@ -60,6 +61,7 @@ struct PackThresholds {
   double further_in_cell = 6;    ///< [ln] more for a further cause in the same cell,
   double share_of_first = 0.03;  ///< and this share of what the first one gained: its model is not better
   double healthy_sigmas = 2;     ///< of its spread, within which a parameter that is not named is healthy
+  double negligible = 0.01;      ///< of a healthy spread: as good as none
   double alike_margin = 4;       ///< [ln] that does not separate two alike causes: no model is as exact as that
   double least_sigmas = 4;       ///< size over its standard deviation
   double ambiguous_from = 0.05;  ///< probability of another cause from which on the verdict is AMBIGUOUS
@@ -126,8 +128,7 @@ struct PackThresholds {
 
   /// Of a cell with more resistance.
   struct SelfHeating {
-    double per_k = 0.03;   ///< that the resistances of a cell fall, as the published 2 to 4 %
-    double unknown = 0.5;  ///< relative error of the effect: the law, and how much of the warmth is the load's
+    double per_k = 0.03;  ///< that the resistances of a cell fall, as the published 2 to 4 %
   } self_heating;
 
   /// Of the current sensor.
@@ -164,6 +165,7 @@ struct PackThresholds {
     double healthy_offset_c = 0.0012, healthy_gain = 0.004;  ///< of a current sensor
     double healthy_capacity = 0.01;                          ///< of all cells, against the cell file
     double resistance = 0.3, polarisation = 0.1, per_k = 0.03, resistance_wave = 0.03;
+    double lead_rows = 1;       ///< standard deviation of the time between a row's mean current and its voltages
     double least_factor = 0.3;  ///< of the resistances against the cell file
     double fault_offset_c = 0.03, fault_gain = 0.1, fault_capacity = 0.15;
     double least_offset_c = 0.004, least_gain = 0.02, least_capacity = 0.04, most_capacity = 0.5;

@@ -19,6 +19,16 @@ double temperature_of(const PackRecording& pack, std::size_t row) {
   return count > 0 ? sum / count : no_value;
 }
 
+/// How much the current changes from row to row, on average before and after a row; 0 where it is not known.
+std::vector<double> change_per_row(const std::vector<double>& current_a) {
+  std::vector<double> change(current_a.size(), 0.0);
+  for (std::size_t k = 1; k + 1 < change.size(); ++k) {
+    const double a = (current_a[k + 1] - current_a[k - 1]) / 2;
+    if (std::isfinite(a)) change[k] = a;
+  }
+  return change;
+}
+
 }  // namespace
 
 Blocks::Blocks(const Track& t, const PackRecording& pack) : block_of_row_(pack.rows(), none) {
@@ -35,6 +45,7 @@ Blocks::Blocks(const Track& t, const PackRecording& pack) : block_of_row_(pack.r
   time_s = means(pack.time_s);
   voltage_v = means(t.neighbours_v);
   current_a = means(pack.current_a);
+  change_a = means(change_per_row(pack.current_a));
   warmer_k = means(warmer_than_at_start(pack));
 }
 

@@ -20,6 +20,7 @@ class Blocks {
   std::size_t count() const { return count_; }
 
   std::vector<double> time_s, voltage_v, current_a, warmer_k;
+  std::vector<double> change_a;  ///< of the current from row to row
 
  private:
   static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();

@@ -31,6 +31,7 @@ enum Unknown : Eigen::Index {
   all_polarisation,
   warmth,
   level,
+  lead,
   wave_1,
   resistance_wave_1 = wave_1 + PackThresholds::Shared::ocv_waves,
   unknowns = resistance_wave_1 + PackThresholds::Shared::resistance_waves
@@ -57,6 +58,7 @@ Unknowns healthy_of(const Track& t) {
   u[all_polarisation] = of_shared.polarisation;
   u[warmth] = of_shared.per_k;
   u[level] = t.ocv_tolerance_v;
+  u[lead] = of_shared.lead_rows;
   for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = of_shared.resistance_wave;
   return u;
 }
@@ -120,6 +122,7 @@ void set_row(const Problem& p, const Unknowns& u, std::size_t block, double soc,
   row[all_polarisation] = v_rc_v;
   row[warmth] = b.warmer_k[block] * (r0_v + v_rc_v);
   row[level] = 1;
+  row[lead] = at.r0_ohm * b.change_a[block];
   const auto wave = [&](Eigen::Index k) { return std::cos(std::numbers::pi * static_cast<double>(k + 1) * soc); };
   for (Eigen::Index k = 0; k < PackThresholds::Shared::ocv_waves; ++k) row[wave_1 + k] = wave(k);
   for (Eigen::Index k = 0; k < PackThresholds::Shared::resistance_waves; ++k)

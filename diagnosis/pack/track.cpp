@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/pack/shared_blocks.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis::pack {
@@ -116,6 +117,8 @@ Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, c
     t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));
   }
   t.v_rc_v = rc_voltage_of(t, pack, 0).v;
+  t.warm_k = warmer_than_at_start(pack);
+  for (double& k : t.warm_k) k = std::max(0.0, k);
   for (std::size_t k = 0; k < pack.rows(); ++k) t.model_v[k] += t.v_rc_v[k];
   return t;
 }

@@ -23,6 +23,7 @@ struct Track {
   std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file
   std::vector<double> r1_by_row_ohm, tau_s;  ///< the same of the polarisation
   std::vector<double> days;                  ///< since the start
+  std::vector<double> warm_k;                ///< that the cells are warmer than at the start
   double mean_v = 0;                         ///< of the neighbours
   std::vector<double> neighbours_v;          ///< mean voltage of the cells that serve as the reference; NaN: unknown
   /// The same without noise where the current is constant. What a cell differs from contains the noise of the

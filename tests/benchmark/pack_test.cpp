@@ -1,6 +1,7 @@
 // Simulated packs with planted faults: the cell and the cause are named, and nothing else.
 #include <algorithm>
 #include <cmath>
+#include <string_view>
 
 #include <gtest/gtest.h>
 
@@ -15,8 +16,8 @@ namespace {
 
 namespace truth = benchmark::truth;
 
-benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy) {
-  const truth::PackCase c = truth::make_pack(seed, index, healthy);
+benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {}) {
+  const truth::PackCase c = truth::make_pack(seed, index, healthy, only);
   measurement::Recording r;
   r.time_s = c.recording.time_s;
   r.current_a = c.recording.current_a;
@@ -60,6 +61,16 @@ TEST(Pack, SeparatesAGrownResistanceFromAJointInTheSamePack) {
   ASSERT_EQ(o.planted[1].fault.id, "resistance_growth");
   ASSERT_EQ(o.planted[2].fault.id, "joint_resistance");
   for (const benchmark::PlantedOutcome& p : o.planted) EXPECT_TRUE(p.named) << p.fault.id << ": " << o.statement;
+  EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+/// A grown resistance warms its cell. Without that, it was found with 1.76 times its size.
+TEST(Pack, SizesAGrownResistanceThatWarmsItsCell) {
+  const benchmark::PackOutcome o = outcome_of(8111, 1, false, "resistance_growth");
+  ASSERT_EQ(o.planted.size(), 1);
+  ASSERT_TRUE(o.planted[0].named) << o.statement;
+  EXPECT_NEAR(o.planted[0].found / o.planted[0].fault.size, 1, 0.2);
+  EXPECT_LT(std::abs(o.planted[0].pull), 3);
   EXPECT_TRUE(o.wrong.empty()) << o.statement;
 }
 

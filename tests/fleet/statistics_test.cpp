@@ -82,6 +82,26 @@ TEST(OnsetOfAChange, IsSeldomFoundInNoise) {
   EXPECT_LE(found, 12);
 }
 
+TEST(OnsetOfAChange, IsNeitherHiddenNorMadeByOneBadDay) {
+  std::mt19937 random(5);
+  int made = 0;
+  for (int n = 0; n < 200; ++n) {
+    const std::size_t bad = n % 2 == 0 ? 24 : random() % 25;
+    auto readings = noisy(random, 25, 0.002, [](double day) { return 0.01 - 0.002 * std::max(0.0, day - 10); });
+    readings[bad].value += 0.04;
+    const auto onset = onset_of(readings, 0.002);
+    ASSERT_TRUE(onset);
+    EXPECT_NEAR(onset->day, 11, 3) << bad;
+    EXPECT_NEAR(onset->per_day, -0.002, 0.0006) << bad;
+    EXPECT_LT(onset->p_value, 1e-4) << bad;
+    auto constant = noisy(random, 25, 0.002, [](double) { return 0.0; });
+    constant[bad].value += 0.04;
+    const auto none = onset_of(constant, 0.002);
+    made += none && none->p_value < 0.01 ? 1 : 0;
+  }
+  EXPECT_LE(made, 6);
+}
+
 TEST(Trend, CoversTheSlopeAndTheDayOfTheLimit) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.01);

@@ -164,5 +164,35 @@ TEST(PackCellFit, AWrongCourseOfTheResistancesDoesNotChangeTheChargeOfACell) {
   EXPECT_NEAR(fit_of(pack, dp::charge, 1).theta[dp::charge], -less, 0.003);
 }
 
+/// The neighbours warm up by warmest_k. The last cell has `growth` more resistance, warms up more in proportion, and
+/// its resistances fall by per_k.
+dp::PackRecording warming_up(double growth, double per_k, double warmest_k) {
+  dp::PackRecording pack = recording_of(20, 0);
+  pack.sensor_c.resize(1);
+  for (std::size_t k = 0; k < rows; ++k) {
+    const double warm_k = warmest_k * std::sin(1.5 * static_cast<double>(k) / rows);
+    double more = growth;
+    for (int n = 0; n < 100; ++n) more = (more + (1 + growth) * std::exp(-per_k * warm_k * more) - 1) / 2;
+    pack.sensor_c[0].push_back(22 + warm_k);
+    pack.cell_v.back()[k] += more * (pack.cell_v.back()[k] - 3 - 0.5 * pack.soc[k]);
+  }
+  return pack;
+}
+
+TEST(PackCellFit, AGrownResistanceThatWarmsItsCellIsNoJoint) {
+  for (const double per_k : {0.02, 0.04}) {
+    const dp::PackRecording pack = warming_up(0.5, per_k, 8);
+    const dp::Track track = track_of(pack);
+    dp::Vector prior = dp::least_spread(r0_ohm);
+    prior[dp::resistance] = dp::fault_spread(r0_ohm)[dp::resistance];
+    prior[dp::delay] = prior[dp::polarisation] = 1e-6;
+    const dp::CellFit fit =
+        dp::fit_cell({.pack = &pack, .track = &track, .warmer_k = {}, .cell = cells - 1, .known_delay_s = {}},
+                     dp::Vector::Zero(), prior, {.white_v = noise_v, .fast_v = 2e-5, .slow_v = 2e-5});
+    EXPECT_NEAR(fit.theta[dp::resistance], 0.5, 0.04) << per_k;
+    EXPECT_LT(std::abs(fit.theta[dp::joint]), 0.04 * r0_ohm) << per_k;
+  }
+}
+
 }  // namespace
 }  // namespace bms

@@ -62,12 +62,16 @@ dp::PackRecording recording_of(const Current& current, double step_s, double ear
   return pack;
 }
 
-std::optional<dp::Estimated> span_in(const dp::PackRecording& pack) {
+dp::Track track_of(const dp::PackRecording& pack) {
   model::CellParameters<> cell = tests::table9;
   for (std::size_t k = 0; k < cell.rc.r1_ohm.size; ++k) cell.rc.r1_ohm[k] = 1e-5;  // no polarisation
+  return dp::track_of(cell, pack);
+}
+
+std::optional<dp::Estimated> span_in(const dp::PackRecording& pack) {
   std::vector<std::size_t> all;
   for (std::size_t c = 0; c < cells; ++c) all.push_back(c);
-  return dp::sampling_span(dp::track_of(cell, pack), pack, all);
+  return dp::sampling_span(track_of(pack), pack, all);
 }
 
 TEST(PackSamplingTimes, FollowFromStepsThatStandAlone) {
@@ -80,7 +84,13 @@ TEST(PackSamplingTimes, FollowFromStepsThatStandAlone) {
 }
 
 TEST(PackSamplingTimes, AreUnknownIfTheCurrentChangesSeveralTimesWithinARow) {
-  EXPECT_FALSE(span_in(recording_of(Current(2, 6, 10.0 * rows), 10, 0.5, 5)));
+  const dp::PackRecording fast = recording_of(Current(2, 6, 10.0 * rows), 10, 0.5, 5);
+  EXPECT_FALSE(span_in(fast));
+  EXPECT_FALSE(dp::steps_stand_alone(track_of(fast), fast));
+  const dp::PackRecording some_alone = recording_of(Current(0.3, 3, rows), 1, 0.05, 0.5);
+  EXPECT_FALSE(dp::steps_stand_alone(track_of(some_alone), some_alone));
+  const dp::PackRecording slow = recording_of(Current(5, 20, rows), 1, 0.05, 0.5);
+  EXPECT_TRUE(dp::steps_stand_alone(track_of(slow), slow));
 }
 
 TEST(PackSamplingTimes, AreUnknownIfTheChannelsAreReadARowAfterTheCurrent) {
