@@ -7,6 +7,30 @@
 
 namespace bms::diagnosis {
 
+namespace {
+
+/// Derivatives by the parameters of the cell file's own mechanisms, in their standard deviations. A fit leaves these as
+/// they are, so that their error goes into what it finds.
+Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  std::vector<ParameterRef> refs;
+  std::vector<double> sigmas;
+  for (std::size_t s = 0; s < fit.hypothesis.own; ++s) {
+    const MechanismSetting& setting = fit.hypothesis.settings[s];
+    const model::MechanismInfo& info = model::catalogue[setting.index];
+    for (std::size_t p = 0; p < info.parameters; ++p) {
+      if (info.parameter[p].role == model::Role::given || !(setting.deviation[p] > 0)) continue;
+      refs.push_back({s, p});
+      sigmas.push_back(setting.deviation[p]);
+    }
+  }
+  if (refs.empty()) return Columns(static_cast<Eigen::Index>(likelihood.samples()), 0);
+  Columns columns = likelihood.derivatives(fit.hypothesis, fit.calibration, refs);
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) *= sigmas[static_cast<std::size_t>(j)];
+  return columns;
+}
+
+}  // namespace
+
 Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const Columns base = likelihood.calibration_derivatives(fit.hypothesis, fit.calibration);
   Columns own = likelihood.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
@@ -14,6 +38,10 @@ Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const Hypoth
       base.transpose() * base + Eigen::MatrixXd::Identity(base.cols(), base.cols());  // with its prior
   const Eigen::MatrixXd follow = normal.ldlt().solve(base.transpose() * own);
   own -= base * follow;
+  Columns file = by_own_mechanisms(likelihood, fit);
+  file -= base * normal.ldlt().solve(base.transpose() * file);
+  const Eigen::MatrixXd with_file = own.transpose() * file,
+                        known = file.transpose() * file + Eigen::MatrixXd::Identity(file.cols(), file.cols());
   Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(own.cols(), own.cols());
   Eigen::Index first = 0;
   double blocks = 0;
@@ -28,7 +56,9 @@ Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const Hypoth
     first += rows;
   }
   // the prior of the base parameters pulls as it is assumed to
-  const Eigen::MatrixXd all = blocks / (blocks - 1) * pulls + follow.transpose() * follow;
+  Eigen::MatrixXd all = blocks / (blocks - 1) * pulls + follow.transpose() * follow;
+  // the file's mechanisms are known to their standard deviations, and together as well as these recordings show
+  if (file.cols() > 0) all += with_file * known.ldlt().solve(with_file.transpose());
   return fit.covariance * all * fit.covariance;
 }
 

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "diagnosis/numerics.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/search.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -13,7 +16,17 @@ namespace {
 
 bool is_reachable(const DetectionLimit& limit, double capacity_ah) {
   const model::Parameter& p = model::catalogue[limit.mechanism].parameter[limit.parameter];
-  return limit.value <= std::max(std::abs(p.lower(capacity_ah)), std::abs(p.upper(capacity_ah)));
+  return thresholds.screening.limits_in_bounds * limit.value <=
+         std::max(std::abs(p.lower(capacity_ah)), std::abs(p.upper(capacity_ah)));
+}
+
+/// The smallest size with this gain, by ever larger ones; what is not reachable as it is.
+double size_with(double needed, DetectionLimit limit, const StrengthSigma& s, double capacity_ah,
+                 const GainOfSize& gain) {
+  const double margin = thresholds.screening.limit_margin * s.sigma;
+  while (is_reachable(limit, capacity_ah) && gain(s, limit.value - margin) < needed)
+    limit.value *= numerics.search.limit_step;
+  return limit.value;
 }
 
 }  // namespace
@@ -23,8 +36,13 @@ std::vector<StrengthSigma> strength_sigmas(LikelihoodModel& likelihood, const No
   likelihood.set_noise(nominal);
   const Screen screen(likelihood, control, scope.searched);
   std::vector<StrengthSigma> sigmas;
+  const PreparedRecording& first = likelihood.records().front();
   for (const Candidate& c : screen.candidates()) {
-    if (c.least_sigma > 0) sigmas.push_back({c.mechanism, c.least_sigma});
+    if (!(c.least_sigma > 0)) continue;
+    StrengthSigma& s = sigmas.emplace_back(StrengthSigma{c.mechanism, c.least_sigma, c.start});
+    // a contact that changes at the end is hardly seen, whatever its size
+    if (knowledge_of(c.mechanism).signature == Signature::contact_change)
+      s.start.value[contact_onset] = (first.time_s.front() + first.time_s.back()) / 2;
   }
   return sigmas;
 }
@@ -35,20 +53,21 @@ double needed_gain(const ResidualTest& left) {
 }
 
 std::vector<DetectionLimit> limits_of(const std::vector<StrengthSigma>& sigmas, const ResidualTest& left,
-                                      double capacity_ah, const HealthyGain& healthy) {
-  std::vector<DetectionLimit> limits;
+                                      double capacity_ah, const HealthyGain& healthy, const GainOfSize& gain) {
+  std::vector<DetectionLimit> all(sigmas.size());
   const double decision = needed_gain(left);
-  for (const StrengthSigma& s : sigmas) {
+  measurement::in_parallel(sigmas.size(), [&](std::size_t k) {
+    const StrengthSigma& s = sigmas[k];
     double needed = decision + price_of_unknowns(s.mechanism);
     if (healthy) {
       const std::optional<double> to_stand_out = healthy(s.mechanism);
-      if (!to_stand_out) continue;
-      needed = std::max(needed, *to_stand_out);
+      needed = std::max(needed, to_stand_out.value_or(std::numeric_limits<double>::infinity()));
     }
-    const DetectionLimit limit{s.mechanism, 0, s.sigma * (std::sqrt(needed) + thresholds.screening.limit_margin)};
-    if (is_reachable(limit, capacity_ah)) limits.push_back(limit);
-  }
-  return limits;
+    all[k] = {s.mechanism, 0, s.sigma * (std::sqrt(needed) + thresholds.screening.limit_margin)};
+    if (gain) all[k].value = size_with(needed, all[k], s, capacity_ah, gain);
+  });
+  std::erase_if(all, [&](const DetectionLimit& limit) { return !is_reachable(limit, capacity_ah); });
+  return all;
 }
 
 }  // namespace bms::diagnosis

@@ -17,6 +17,7 @@ namespace bms::diagnosis {
 struct StrengthSigma {
   std::size_t mechanism = 0;
   double sigma = 0;
+  MechanismSetting start = {};  ///< the most likely form and moment of it
 };
 
 /// Of all mechanisms that can be tested, with the nominal noise.
@@ -30,9 +31,13 @@ double needed_gain(const ResidualTest& left);
 /// Gain that a mechanism needs to stand out from healthy recordings; nothing if it cannot.
 using HealthyGain = std::function<std::optional<double>(std::size_t mechanism)>;
 
-/// Sizes that are named in 9 of 10 recordings like these. healthy: empty if no healthy recordings are known. Those
-/// outside of a parameter's bounds are left out: others would never be named.
+/// Gain of a mechanism of this first strength, if it were in the recordings (effect_gain.hpp).
+using GainOfSize = std::function<double(const StrengthSigma& mechanism, double size)>;
+
+/// Sizes that are named in 9 of 10 recordings like these. healthy: empty if no healthy recordings are known. gain:
+/// empty if a gain is as the square of the size, as far as it is needed. Those of which twice the size is outside of a
+/// parameter's bounds are left out: they would hardly be named.
 std::vector<DetectionLimit> limits_of(const std::vector<StrengthSigma>& sigmas, const ResidualTest& left,
-                                      double capacity_ah, const HealthyGain& healthy);
+                                      double capacity_ah, const HealthyGain& healthy, const GainOfSize& gain = {});
 
 }  // namespace bms::diagnosis

@@ -8,10 +8,12 @@
 #include "diagnosis/adequacy.hpp"
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/detection_limits.hpp"
+#include "diagnosis/effect_gain.hpp"
 #include "diagnosis/findings.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/one_current.hpp"
 #include "diagnosis/prepare.hpp"
+#include "diagnosis/profile.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
@@ -145,6 +147,23 @@ void add_location(const LikelihoodModel& likelihood, const HypothesisFit& best, 
   d.unexplained_share = 0;
 }
 
+/// Sizes that would be named. Next to healthy recordings a gain must often be so large that it is no longer as the
+/// square of the size.
+std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, const NoiseModel& nominal,
+                                          const HypothesisFit& control, const std::vector<StrengthSigma>& sigmas,
+                                          const Adequacy& adequacy, const std::optional<HealthyJudge>& judge_healthy) {
+  const double capacity_ah = likelihood.cell().capacity_ah;
+  if (!judge_healthy) return limits_of(sigmas, adequacy.residual, capacity_ah, {});
+  const EffectGain effect(likelihood, nominal, control);
+  const auto gain_of_size = [&](const StrengthSigma& s, double size) {
+    MechanismSetting setting = s.start;
+    setting.value[0] = size;
+    return effect.of(setting);
+  };
+  const auto stands_out = [&](std::size_t mechanism) { return judge_healthy->gain_needed(mechanism); };
+  return limits_of(sigmas, adequacy.residual, capacity_ah, stands_out, gain_of_size);
+}
+
 /// Where an unknown cause sits, and the cell with a term for it.
 void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, Diagnosis& d) {
   if (d.verdict != Verdict::unknown || d.interrupted) return;
@@ -229,9 +248,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     survivors = without_uncertain(search, likelihood, control, std::move(survivors));
   }
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
-  HealthyGain stands_out;
-  if (judge_healthy) stands_out = [&](std::size_t mechanism) { return judge_healthy->gain_needed(mechanism); };
-  d.limits = limits_of(sigmas, adequacy.residual, cell.capacity_ah, stands_out);
+  d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   d.unknown_gain = unknown_gain(adequacy.residual);
   if (options.learns && adequacy.found)
     d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));
@@ -240,6 +257,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     d.healthy = judge_healthy->basis();
     d.withheld = judge_healthy->withheld();
   }
+  if (!options.learns) survivors.best = profiled(likelihood, std::move(survivors.best));
   include_model_error(likelihood, survivors.best);
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);

@@ -9,6 +9,19 @@
 
 namespace bms::diagnosis {
 
+namespace {
+
+/// Beyond priors.tail standard deviations what is rare costs as much more as its logarithm, not as its square: a
+/// divider that is wrong by half must be found with its size, and not be pulled to what is common.
+PriorDistance with_tail(PriorDistance d) {
+  const double tail = thresholds.priors.tail, size = std::abs(d.away);
+  if (size <= tail) return d;
+  const double away = tail * std::sqrt(1 + 2 * std::log(size / tail));
+  return {std::copysign(away, d.away), d.sigma * away * size / (tail * tail)};  // sigma: 1 / (d away / d value)
+}
+
+}  // namespace
+
 FitParameters::FitParameters(const model::CellParameters<>& cell, const Hypothesis& start)
     : capacity_ah_(cell.capacity_ah), sought_(start.sought()) {
   const double rc_s = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, numerics.middle_soc) *
@@ -56,7 +69,7 @@ PriorDistance FitParameters::prior_distance(Eigen::Index j, double v) const {
   const double common = p.common(capacity_ah_);
   if (common <= 0 || std::abs(v) <= common) return {};
   const double sigma = thresholds.priors.rarity * common;
-  return {(v - std::copysign(common, v)) / sigma, sigma};
+  return with_tail({(v - std::copysign(common, v)) / sigma, sigma});
 }
 
 double FitParameters::prior(Hypothesis& h) const {

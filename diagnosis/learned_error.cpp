@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <string_view>
 
 #include "diagnosis/charge_count.hpp"
@@ -29,16 +30,25 @@ bool was_at(const std::vector<HealthyRegime>& regimes, std::string_view axis, do
   return !any || !std::isfinite(value);
 }
 
+/// The largest current of healthy recordings in multiples of the capacity, to the end of its range; infinite if it is
+/// not known. A smaller current makes a smaller error.
+double largest_c(const std::vector<HealthyRegime>& regimes) {
+  double largest = 0;
+  for (const HealthyRegime& r : regimes)
+    largest = r.axis == "current_c" && r.hours > 0 ? std::max(largest, r.to) : largest;
+  return largest > 0 ? largest : std::numeric_limits<double>::infinity();
+}
+
 /// Share of the rows at states of charge, currents and temperatures of the regimes.
 double share_within(const std::vector<HealthyRegime>& regimes, double capacity_ah,
                     const std::vector<PreparedRecording>& records) {
   double within = 0, rows = 0;
+  const double most_a = capacity_ah * largest_c(regimes);
   for (const PreparedRecording& r : records) {
     for_each_row(r, capacity_ah, [&](const CountedRow& row) {
       const double at_c = r.temperature_c.empty() ? std::nan("") : r.temperature_c[row.k];
       const bool there = was_at(regimes, "soc", row.soc, learned_limits.soc_beyond) &&
-                         was_at(regimes, "current_c", std::abs(row.current_a) / capacity_ah, 0) &&
-                         was_at(regimes, "temperature_c", at_c, 0);
+                         std::abs(row.current_a) <= most_a && was_at(regimes, "temperature_c", at_c, 0);
       within += there ? 1 : 0;
       ++rows;
     });
@@ -72,7 +82,8 @@ LearnedError::LearnedError(const std::vector<HealthyRegime>& regimes, const mode
   if (points.size() < 2) return;
   usual_v_ = measurement::median(errors_v);
   if (usual_v_ >= cell.tolerance.ocv_v) return;
-  if (share_within(regimes, cell.capacity_ah, records) < learned_limits.learned_within) return;
+  elsewhere_ = share_within(regimes, cell.capacity_ah, records) < learned_limits.learned_within;
+  if (elsewhere_) return;
   std::sort(points.begin(), points.end(), [](const Point& a, const Point& b) { return a.soc < b.soc; });
   least_v_ = *std::min_element(errors_v.begin(), errors_v.end());
   points_ = std::move(points);

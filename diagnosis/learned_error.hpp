@@ -24,6 +24,8 @@ class LearnedError {
                const std::vector<PreparedRecording>& records);
 
   bool known() const { return !points_.empty(); }
+  /// Not known only because the records go elsewhere.
+  bool is_elsewhere() const { return elsewhere_; }
   /// Standard deviation [V].
   double at(double soc) const;
   /// Its square less that of the least one, which the tolerance contains [V^2].
@@ -37,6 +39,7 @@ class LearnedError {
     double soc, error_v;
   };
   std::vector<Point> points_;  ///< by soc
+  bool elsewhere_ = false;
   double least_v_ = 0, usual_v_ = 0, largest_a_ = 0;
 };
 

@@ -64,6 +64,7 @@ struct Numerics {
     double onset_margin = 0.04;  ///< of the recording at each end, where a step is not a step
     std::array<double, 4> onset_steps = {-1, -0.5, 0.5, 1};
     double shortest_hours = 0.1;                ///< for the current that moves a given charge
+    double limit_step = 1.25;                   ///< factor from one detection limit tried to the next
     double least_gain = 0.5;                    ///< of a cause on a healthy block; less is not stored
     double most_gain = 1e12, gain_step = 1e-3;  ///< of a bisection, in ln
     double progress_steps = 20;                 ///< after which 63 % are shown as done

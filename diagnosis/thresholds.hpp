@@ -82,6 +82,8 @@ struct Thresholds {
   /// Priors of mechanisms' parameters, besides what the catalogue knows of them (model::Parameter::typical).
   struct Priors {
     double rarity = 0.5;   ///< of a strength beyond what is common: sigma over the common size
+    double tail = 3;       ///< of these sigmas beyond which the cost grows as the logarithm: faults of instruments have
+                           ///< no largest usual size
     double log_sigma = 1;  ///< of a shape, in ln: a factor of e between its default and an unusual value
   };
 
@@ -178,6 +180,7 @@ struct Thresholds {
     double per_unknown = 2;          ///< gain that noise alone gives to every unknown after the first
     double limit_margin = 1.28;      ///< standard deviations of a strength above the smallest that is named, from which
                                      ///< it is named in 9 of 10 recordings
+    double limits_in_bounds = 2;     ///< a limit is stated where so many times its size is within the bounds
     double start_share = 0.6;        ///< a fit begins within this share of the bounds
     std::size_t moments = 40;        ///< onsets tried of a contact that has changed
     std::size_t moments_margin = 2;  ///< of them left out at each end of the recording

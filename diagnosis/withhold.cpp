@@ -4,7 +4,10 @@
 #include <cmath>
 
 #include "diagnosis/charge_count.hpp"
+#include "diagnosis/one_current.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "diagnosis/true_current.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
 
@@ -45,10 +48,23 @@ double covered_share(const std::vector<PreparedRecording>& records, const measur
   return rows > 0 ? inside / rows : 0;
 }
 
-HealthyBasis basis_of(const std::vector<PreparedRecording>& records, const measurement::HealthyData& healthy,
-                      double rate, double capacity_ah) {
-  return {healthy.hours(), healthy.recordings(), healthy.blocks.size(), rate,
-          covered_share(records, healthy, capacity_ah)};
+/// RMS error of a fit [V].
+double error_of(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  measurement::MeanSquare error;
+  for (std::size_t r = 0; r < likelihood.records().size(); ++r) {
+    const std::vector<double> fitted_v = likelihood.voltage(fit.hypothesis, fit.calibration, r);
+    for (std::size_t k = 0; k < fitted_v.size(); ++k) {
+      const double e = likelihood.records()[r].voltage_v[k] - fitted_v[k];
+      if (std::isfinite(e)) error.add(e);
+    }
+  }
+  return error.root();
+}
+
+double largest_error_v(const measurement::HealthyData& healthy) {
+  double largest_v = 0;
+  for (const measurement::HealthyBlock& b : healthy.blocks) largest_v = std::max(largest_v, b.error_v);
+  return largest_v;
 }
 
 }  // namespace
@@ -74,7 +90,9 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
       likelihood_(likelihood),
       control_(control),
       scope_(scope),
-      basis_(basis_of(likelihood.records(), healthy, false_alarm_rate, likelihood.cell().capacity_ah)),
+      healthy_(healthy),
+      as_read_(covered_share(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
+      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
       null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
 
 bool HealthyJudge::is_covered() const { return basis_.covered >= withhold_limits.covered_at_least; }
@@ -99,12 +117,41 @@ std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
   return least;
 }
 
-Survivors HealthyJudge::without_withheld(Survivors found) {
-  if (!is_covered()) {
-    for (const std::size_t m : found.best.hypothesis.added())
-      withheld_.push_back({m, *found.best.hypothesis.find(m), found.gains.at(m), compare(m, found.gains.at(m)), true});
-    return {control_, {}, {}, {}};
+double HealthyJudge::covered_by(const HypothesisFit& fit) const {
+  const auto is_of_current = [](std::size_t m) {
+    return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
+  };
+  const std::vector<std::size_t> added = fit.hypothesis.added();
+  if (std::none_of(added.begin(), added.end(), is_of_current)) return 0;
+  if (error_of(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return 0;
+  return covered_share(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
+}
+
+void HealthyJudge::cover_true_current(const Survivors& found) {
+  basis_.covered = as_read_;
+  if (is_covered()) return;
+  basis_.covered = std::max(as_read_, covered_by(found.best));
+  const double reach = has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah)
+                           ? thresholds.decision.tie_inseparable
+                           : thresholds.decision.tie;
+  for (const auto& [m, rivals] : found.rivals) {
+    for (const HypothesisFit& rival : rivals) {
+      if (search_.score(rival) - search_.score(found.best) < reach)
+        basis_.covered = std::max(basis_.covered, covered_by(rival));
+    }
   }
+}
+
+Survivors HealthyJudge::nothing_of(const Survivors& found) {
+  for (Withheld& w : withheld_) w.not_covered = true;
+  for (const std::size_t m : found.best.hypothesis.added())
+    withheld_.push_back({m, *found.best.hypothesis.find(m), found.gains.at(m), compare(m, found.gains.at(m)), true});
+  return {control_, {}, {}, {}};
+}
+
+Survivors HealthyJudge::without_withheld(Survivors found) {
+  cover_true_current(found);
+  if (!is_covered()) return nothing_of(found);
   for (bool removed = true; removed;) {
     removed = false;
     while (std::optional<Withheld> least = least_of(found)) {
@@ -117,7 +164,8 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     if (found.best.hypothesis.added().empty()) break;
     if (removed) found = eliminate(search_, likelihood_, control_, found.best, scope_);
   }
-  return found;
+  if (!withheld_.empty()) cover_true_current(found);
+  return is_covered() ? found : nothing_of(found);
 }
 
 std::optional<double> HealthyJudge::gain_needed(std::size_t mechanism) const {

@@ -39,6 +39,13 @@ class HealthyJudge {
  private:
   /// Returns true if the healthy blocks stand for enough of the recordings.
   bool is_covered() const;
+  /// Share of the rows that healthy blocks stand for with the current sensor's error of a fit taken away; 0 if it has
+  /// none, or if it leaves more than healthy recordings show.
+  double covered_by(const HypothesisFit& fit) const;
+  /// A recording beyond the healthy ones is covered if it is by the best fit or by a rival that equals it.
+  void cover_true_current(const Survivors& found);
+  /// Withholds everything: the healthy recordings were not there.
+  Survivors nothing_of(const Survivors& found);
   HealthyComparison compare(std::size_t mechanism, double gain) const;
   /// The mechanism that stands out least; nothing if all stand out.
   std::optional<Withheld> least_of(const Survivors& found) const;
@@ -47,6 +54,8 @@ class HealthyJudge {
   const LikelihoodModel& likelihood_;
   const HypothesisFit& control_;
   Scope scope_;  ///< without what was withheld
+  const measurement::HealthyData& healthy_;
+  double as_read_;  ///< share of the rows that healthy blocks stand for
   HealthyBasis basis_;
   HealthyNull null_;
   std::vector<Withheld> withheld_;

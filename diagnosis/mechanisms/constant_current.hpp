@@ -19,7 +19,7 @@ inline constexpr double shortest_s = 600;
 
 /// Charge over the whole recordings that far starts move, in soc: in a real recording an offset that moved 13 % of soc
 /// gained nothing from the signature's estimate and 213 from there.
-inline constexpr std::array moved_soc = {-0.12, -0.06, -0.03, 0.03, 0.06, 0.12};
+inline constexpr std::array moved_soc = {-0.4, -0.2, -0.12, -0.06, -0.03, 0.03, 0.06, 0.12, 0.2, 0.4};
 
 inline std::optional<std::string> too_short(const TestConditions& c) {
   if (c.facts.duration_s < shortest_s) return "the recording is too short";

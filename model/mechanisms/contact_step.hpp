@@ -12,7 +12,7 @@ struct ContactStep {
   static constexpr Domain domain = Domain::physics;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"resistance_ohm", "ohm", Role::strength, 0, -0.05, 0.5, Per::siemens, "added to R0"},
+      Parameter{"resistance_ohm", "ohm", Role::strength, 0, -0.05, 1.5, Per::siemens, "added to R0"},
       Parameter{"onset_s", "s", Role::given, 0, -1e12, 1e12, Per::cell,
                 "time in the recording; in later recordings it acts from the start"},
   };

@@ -10,7 +10,7 @@ struct CurrentGain {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"gain_error", "1", Role::strength, 0, -0.4, 0.4, Per::cell, "g", 0.03},
+      Parameter{"gain_error", "1", Role::strength, 0, -0.5, 1, Per::cell, "g", 0.03},
   };
 
   template <class S>

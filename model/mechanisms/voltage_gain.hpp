@@ -10,7 +10,7 @@ struct VoltageGain {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"gain_error", "1", Role::strength, 0, -0.03, 0.03, Per::cell, "g", 0.006},
+      Parameter{"gain_error", "1", Role::strength, 0, -0.2, 0.2, Per::cell, "g", 0.006},
   };
 
   template <class S>

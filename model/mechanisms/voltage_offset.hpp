@@ -10,7 +10,7 @@ struct VoltageOffset {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"offset_v", "V", Role::strength, 0, -0.1, 0.1, Per::cell, "b", 0.02},
+      Parameter{"offset_v", "V", Role::strength, 0, -0.5, 0.5, Per::cell, "b", 0.02},
   };
 
   template <class S>

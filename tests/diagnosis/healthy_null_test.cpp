@@ -230,6 +230,33 @@ TEST(DiagnoseWithHealthy, BlamesNothingWhereTheHealthyRecordingsWereNot) {
   EXPECT_THAT(d.statement, testing::StartsWith("Not enough healthy data to blame anything"));
 }
 
+/// 1.5C with short rests.
+PreparedRecording pulsed_discharge(std::uint64_t seed, double extra_ohm = 0) {
+  std::vector<double> current_a;
+  for (int k = 0; k < 2'000; ++k) current_a.push_back(k % 120 < 20 ? 0 : -9);
+  return test::recorded(current_a, 0.9, seed, not_in_the_model(extra_ohm));
+}
+
+TEST(DiagnoseWithHealthy, ASensorThatReadsTooMuchDoesNotHideBeyondTheHealthyCurrents) {
+  Options learning, options;
+  learning.learns = true;
+  options.healthy.known = true;
+  for (const std::uint64_t seed : {301U, 302U, 303U, 304U}) {
+    const PreparedRecording r = pulsed_discharge(seed);
+    options.healthy.blocks.push_back(healthy_block(r, diagnose(test::table9(), {}, {r}, learning)));
+  }
+  PreparedRecording r = pulsed_discharge(305);
+  for (double& a : r.current_a.edit()) a *= 1.35;
+  const Diagnosis d = diagnose(test::table9(), {}, {r}, options);
+  ASSERT_TRUE(names(d.verdict)) << name_of(d.verdict);
+  EXPECT_EQ(model::catalogue[d.findings.front().setting.index].id, "current_gain");
+  EXPECT_NEAR(d.findings.front().setting.value[0], 0.35, 0.06) << "the cell's relaxation is not in the model";
+  EXPECT_GE(d.healthy->covered, 0.9);
+  // such a load on a cell that has another resistance, however, is not known
+  for (HealthyBlock& b : options.healthy.blocks) b.current_a = {-5, 0};
+  EXPECT_EQ(diagnose(test::table9(), {}, {pulsed_discharge(306, 0.01)}, options).verdict, Verdict::not_testable);
+}
+
 TEST(DiagnoseWithHealthy, TheStandardDeviationContainsTheErrorOfTheModel) {
   // 3 mOhm of R0 in addition to a relaxation that the fit does not have; plain: from a white residual
   const MechanismSetting growth = [] {

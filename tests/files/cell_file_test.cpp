@@ -316,8 +316,8 @@ TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
   EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "decay = \"fast\"")), HasSubstr("expected a number"));
   EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "decay = nan")),
               HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 8 to 400"));
-  EXPECT_THAT(cell_refusal(replaced(good, "offset_a = 0.03", "offset_a = 3")),
-              HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -0.6 to 0.6 A"));
+  EXPECT_THAT(cell_refusal(replaced(good, "offset_a = 0.03", "offset_a = 4")),
+              HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -3 to 3 A"));
   EXPECT_THAT(cell_refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")),
               HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
   EXPECT_THAT(cell_refusal("mechanism = 1\n" + table9_text()),
