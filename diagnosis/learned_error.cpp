@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <string_view>
 
 #include "diagnosis/charge_count.hpp"
@@ -30,25 +29,16 @@ bool was_at(const std::vector<HealthyRegime>& regimes, std::string_view axis, do
   return !any || !std::isfinite(value);
 }
 
-/// The largest current of healthy recordings in multiples of the capacity, to the end of its range; infinite if it is
-/// not known. A smaller current makes a smaller error.
-double largest_c(const std::vector<HealthyRegime>& regimes) {
-  double largest = 0;
-  for (const HealthyRegime& r : regimes)
-    largest = r.axis == "current_c" && r.hours > 0 ? std::max(largest, r.to) : largest;
-  return largest > 0 ? largest : std::numeric_limits<double>::infinity();
-}
-
 /// Share of the rows at states of charge, currents and temperatures of the regimes.
 double share_within(const std::vector<HealthyRegime>& regimes, double capacity_ah,
                     const std::vector<PreparedRecording>& records) {
   double within = 0, rows = 0;
-  const double most_a = capacity_ah * largest_c(regimes);
   for (const PreparedRecording& r : records) {
     for_each_row(r, capacity_ah, [&](const CountedRow& row) {
       const double at_c = r.temperature_c.empty() ? std::nan("") : r.temperature_c[row.k];
       const bool there = was_at(regimes, "soc", row.soc, learned_limits.soc_beyond) &&
-                         std::abs(row.current_a) <= most_a && was_at(regimes, "temperature_c", at_c, 0);
+                         was_at(regimes, "current_c", std::abs(row.current_a) / capacity_ah, 0) &&
+                         was_at(regimes, "temperature_c", at_c, 0);
       within += there ? 1 : 0;
       ++rows;
     });
