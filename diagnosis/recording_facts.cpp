@@ -85,6 +85,18 @@ void count_charge(const PreparedRecording& r, RecordingFacts& facts, Range& soc,
   });
 }
 
+/// Mean error of the current sensor where no current flows, in its standard deviations.
+double zero_error_sigmas(const PreparedRecording& r, double capacity_ah) {
+  double sum = 0, weight = 0;
+  for (const Check& c : r.checks) {
+    if (c.channel != Check::Channel::current || std::abs(c.reference) > fact_limits.rest_c * capacity_ah) continue;
+    const double deviation = c.deviation();
+    sum += (c.read - c.reference) / (deviation * deviation);
+    weight += 1 / (deviation * deviation);
+  }
+  return weight > 0 ? std::abs(sum) / std::sqrt(weight) : 0;
+}
+
 }  // namespace
 
 RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<const PreparedRecording> records) {
@@ -100,6 +112,7 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
     facts.duration_h += r.duration_s() / 3'600;
     facts.start_given = facts.start_given || r.initial_soc_given;
     facts.trusted_instruments = facts.trusted_instruments || !r.checks.empty();
+    facts.zero_error_sigmas = std::max(facts.zero_error_sigmas, zero_error_sigmas(r, capacity_ah));
     count_charge(r, facts, soc, rates, steps_s);
     for (const double a : r.current_a) {
       if (!std::isfinite(a)) continue;

@@ -34,6 +34,7 @@ struct RecordingFacts {
   std::size_t rates = 0;             ///< sizes of current
   bool start_given = false;          ///< a user gave the initial soc of one at least
   bool trusted_instruments = false;  ///< readings of trusted instruments exist
+  double zero_error_sigmas = 0;      ///< of the current sensor's zero, by its checks where no current flows
   std::optional<double> rail_a;  ///< largest current, if it is reached often enough to show that the sensor ends there
   double error_v = 0;            ///< RMS of measured less cell file's voltage; 0 unless describe() fills it in
 };

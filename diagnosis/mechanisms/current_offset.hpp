@@ -26,6 +26,11 @@ struct Knowledge<model::CurrentOffset> : DefaultKnowledge<model::CurrentOffset> 
   static std::string claim(const MechanismSetting& s) {
     return fmt::format("the current sensor reads {} too {}", size_text(s, 0), s.value[0] >= 0 ? "high" : "low");
   }
+  static constexpr double certain_sigmas = 5;  ///< of the reading in rests, from which the sensor's zero is off
+
+  static bool expected(const model::CellParameters<>&, const RecordingFacts& seen) {
+    return seen.zero_error_sigmas > certain_sigmas;
+  }
   static std::optional<std::string> not_testable(const TestConditions& c) { return constant_current::too_short(c); }
   static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& seen) {
     return constant_current::far_starts(model::CurrentOffset::parameters[0], seen);
