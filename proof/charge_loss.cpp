@@ -1,5 +1,5 @@
-// Charge balance: what the cycler counts and the cell does not store, confirmed by the current that is read while the
-// cell is idle and by the counters of the cycler.
+// Charge balance: what the cycler counts and the cell does not store, confirmed by the counters of the cycler from full
+// to full. The current that is read while the cell is idle is an input of the diagnosis.
 #include "proof/charge_loss.hpp"
 
 #include <algorithm>
@@ -24,7 +24,7 @@ class ReportedLoss : public Procedure {
       : cell_(file.text("cell")),
         losses_(read_charge_losses(file)),
         named_(read_named_claim(claims, "named", {"recording", "missing"})),
-        size_(read_number_claim(claims, "size", {"recording", "missing", "idle", "idle_charge", "hours"})) {
+        size_(read_number_claim(claims, "size", {"recording", "missing", "idle"})) {
     for (files::TomlTable& table : file.tables("recording")) {
       recordings_.push_back({table.text("name"), table.number("missing_ah")});
       table.finish();
@@ -33,22 +33,18 @@ class ReportedLoss : public Procedure {
 
   void run(ProofLab& lab, ProofExperiment& e) const override {
     ProofPoints points{
-        "Charge counted but not stored: measured by the idle current, and as diagnosed", "", "mAh", {}, {}};
+        "Charge counted but not stored: by the counters of the cycler, and as diagnosed", "", "mAh", {}, {}};
     points.predicted.push_back({"diagnosed", {}});
     for (const CounterReading& counters : recordings_) {
       const workflow::DiagnoseResult& r =
           lab.diagnosed(lab.built_in(cell_), std::vector<std::string>{counters.recording});
       const std::string name = stem(counters.recording);
-      const IdleCurrent idle = idle_current(lab.recording(counters.recording));
-      const double hours = idle.on_s / 3'600, idle_ah = idle.reading_a.value * idle.on_s / 3'600;
+      const Value idle_a = idle_current_a(lab.recording(counters.recording));
       const Words words = {{"recording", name},
                            {"missing", milliampere_hours(counters.missing_ah)},
-                           {"idle", milliamperes(idle.reading_a.value)},
-                           {"idle_charge", milliampere_hours(idle_ah)},
-                           {"hours", fmt::format("{:.1f}", hours)}};
+                           {"idle", milliamperes(idle_a.value)}};
       add_named(e, named_, words, r);
-      // the idle current and the counters are two measurements of the same loss
-      const Value measured{(idle_ah + counters.missing_ah) / 2, std::abs(idle_ah - counters.missing_ah) / 2};
+      const Value measured{counters.missing_ah, 0};
       const auto claimed = lost_charge_ah(r, losses_);
       add_number(e, size_.text, words,
                  {.claimed = claimed,
@@ -91,8 +87,8 @@ class NoLoss : public Procedure {
       const bool diagnosed = r.diagnosis.verdict != diagnosis::Verdict::data_fault &&
                              r.diagnosis.verdict != diagnosis::Verdict::not_testable;
       const auto claimed = lost_charge_ah(r, losses_);
-      const IdleCurrent idle = idle_current(lab.recording(recording));
-      add_outcome(e, no_loss_, {{"recording", stem(recording)}, {"idle", milliamperes(idle.reading_a.value)}},
+      const Value idle_a = idle_current_a(lab.recording(recording));
+      add_outcome(e, no_loss_, {{"recording", stem(recording)}, {"idle", milliamperes(idle_a.value)}},
                   {.diagnosed = summary_of(r),
                    .expected = "a diagnosis that does not name " + mechanisms_of(losses_),
                    .holds = diagnosed && !claimed});

@@ -84,23 +84,18 @@ std::vector<measurement::Rows> rests(const measurement::Recording& r, double at_
   return list;
 }
 
-IdleCurrent idle_current(const measurement::Recording& r) {
-  IdleCurrent idle;
+Value idle_current_a(const measurement::Recording& r) {
   double sum = 0, squares = 0;
   std::size_t count = 0;
   for (std::size_t k = 1; k < r.rows(); ++k) {
-    if (r.current_a[k] == 0) continue;
-    idle.on_s += r.time_s[k] - r.time_s[k - 1];
-    if (!(std::abs(r.current_a[k]) < idle_a)) continue;
+    if (r.current_a[k] == 0 || !(std::abs(r.current_a[k]) < idle_a)) continue;
     sum += r.current_a[k];
     squares += r.current_a[k] * r.current_a[k];
     ++count;
   }
-  if (count > 0) {
-    const double n = static_cast<double>(count), mean = sum / n;
-    idle.reading_a = {mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / n)};
-  }
-  return idle;
+  if (count == 0) return {};
+  const double n = static_cast<double>(count), mean = sum / n;
+  return {mean, std::sqrt(std::max(0.0, squares / n - mean * mean) / n)};
 }
 
 }  // namespace bms::proof

@@ -38,10 +38,6 @@ std::vector<measurement::Rows> rests(const measurement::Recording& r, double at_
 
 /// The current that is read while none flows and the channel is on. In the rests of the cycler itself the channel is
 /// off and reads exactly 0.
-struct IdleCurrent {
-  Value reading_a;
-  double on_s = 0;  ///< time for which the channel is on
-};
-IdleCurrent idle_current(const measurement::Recording& r);
+Value idle_current_a(const measurement::Recording& r);
 
 }  // namespace bms::proof

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/selection.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -56,6 +57,12 @@ TEST(IdleReading, OfAChargingCurrentAfterEachDischargeIsAnErrorOfTheSensor) {
   };
   EXPECT_NEAR(fitted_offset(checked).first, 0.03, 2 * fitted_offset(checked).second);
   EXPECT_LT(fitted_offset(checked).second, 0.5 * fitted_offset(r).second);
+  const auto is_certain = [](const PreparedRecording& record) {
+    const LikelihoodModel likelihood(test::table9(), {}, {record}, NoiseModel{});
+    return scope_of(likelihood).expected.contains(model::mechanism_index("current_offset"));
+  };
+  EXPECT_TRUE(is_certain(checked));
+  EXPECT_FALSE(is_certain(r)) << "without the rests";
 }
 
 TEST(IdleReading, SaysNothingWhereACurrentMayFlow) {
