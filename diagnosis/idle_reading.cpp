@@ -96,7 +96,8 @@ void add_idle_checks(PreparedRecording& r, const model::CellParameters<>& cell) 
                         .read = rest.read_a,
                         .reference = 0,
                         .steady = steady,
-                        .unsteady = thresholds.references.unsteady_share * rest.read_a});
+                        .unsteady = thresholds.references.unsteady_share * rest.read_a,
+                        .assumed = true});
   }
 }
 

@@ -19,6 +19,7 @@ struct Check {
   double reference = 0;  ///< mean of the trusted one [A or V]
   double steady = 1;     ///< part of the deviation that does not grow with the instrument's error [A or V]
   double unsteady = 0;   ///< part that does
+  bool assumed = false;  ///< there was no trusted instrument: the reference is what must flow (idle_reading.hpp)
   /// Standard deviation of read less reference if the hypothesis holds. times: factor on the steady part.
   double deviation(double times = 1) const { return std::hypot(times * steady, unsteady); }
 };

@@ -111,7 +111,8 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
     facts.duration_s += r.duration_s();
     facts.duration_h += r.duration_s() / 3'600;
     facts.start_given = facts.start_given || r.initial_soc_given;
-    facts.trusted_instruments = facts.trusted_instruments || !r.checks.empty();
+    facts.trusted_instruments = facts.trusted_instruments || std::any_of(r.checks.begin(), r.checks.end(),
+                                                                         [](const Check& c) { return !c.assumed; });
     facts.zero_error_sigmas = std::max(facts.zero_error_sigmas, zero_error_sigmas(r, capacity_ah));
     count_charge(r, facts, soc, rates, steps_s);
     for (const double a : r.current_a) {

@@ -10,7 +10,7 @@ struct CurrentOffset {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"offset_a", "A", Role::strength, 0, -0.5, 0.5, Per::ah, "b; bounds in multiples of 1C"},
+      Parameter{"offset_a", "A", Role::strength, 0, -0.3, 0.3, Per::ah, "b; bounds in multiples of 1C"},
   };
 
   template <class S>

@@ -8,6 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/recording_facts.hpp"
 #include "diagnosis/selection.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
@@ -62,6 +63,8 @@ TEST(IdleReading, OfAChargingCurrentAfterEachDischargeIsAnErrorOfTheSensor) {
     return scope_of(likelihood).expected.contains(model::mechanism_index("current_offset"));
   };
   EXPECT_TRUE(is_certain(checked));
+  EXPECT_FALSE(recording_facts(test::table9(), std::vector{checked}).trusted_instruments)
+      << "a leakage next to the offset cannot be told from it";
   EXPECT_FALSE(is_certain(r)) << "without the rests";
 }
 

@@ -317,7 +317,7 @@ TEST(CellFile, RejectsAMechanismThatIsUnknownMisspeltOutOfRangeOrInTheWrongTable
   EXPECT_THAT(cell_refusal(replaced(good, "decay = 55", "decay = nan")),
               HasSubstr("'mechanism.ocv_hysteresis.decay' is out of range, expected 8 to 400"));
   EXPECT_THAT(cell_refusal(replaced(good, "offset_a = 0.03", "offset_a = 4")),
-              HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -3 to 3 A"));
+              HasSubstr("'instrument.current_offset.offset_a' is out of range, expected -1.8 to 1.8 A"));
   EXPECT_THAT(cell_refusal(replaced(good, "half_gap_v_std = 0.001", "half_gap_v_std = -1")),
               HasSubstr("'mechanism.ocv_hysteresis.half_gap_v_std' is out of range, expected 0 or more"));
   EXPECT_THAT(cell_refusal("mechanism = 1\n" + table9_text()),
