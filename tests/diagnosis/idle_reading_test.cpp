@@ -64,7 +64,7 @@ TEST(IdleReading, OfAChargingCurrentAfterEachDischargeIsAnErrorOfTheSensor) {
   };
   EXPECT_TRUE(is_certain(checked));
   EXPECT_FALSE(recording_facts(test::table9(), std::vector{checked}).trusted_instruments)
-      << "a leakage next to the offset cannot be told from it";
+      << "a leakage next to the offset cannot be distinguished from it";
   EXPECT_FALSE(is_certain(r)) << "without the rests";
 }
 

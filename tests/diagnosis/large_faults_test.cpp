@@ -29,7 +29,7 @@ TEST(LargeFaults, OfInstrumentsAreNamedWithTheirSize) {
     PreparedRecording recording;
   };
   for (const Case& c :
-       {Case{"current_gain", 0.35, with_fault(0.35, 0, 0, 0)}, Case{"current_offset", 2.1, with_fault(0, 2.1, 0, 0)},
+       {Case{"current_gain", 0.35, with_fault(0.35, 0, 0, 0)}, Case{"current_offset", 1.5, with_fault(0, 1.5, 0, 0)},
         Case{"voltage_gain", -0.12, with_fault(0, 0, -0.12, 0)},
         Case{"voltage_offset", 0.3, with_fault(0, 0, 0, 0.3)}}) {
     const Diagnosis d = diagnose(test::table9(), {}, {c.recording});
