@@ -36,10 +36,11 @@ Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const Hypoth
   Columns own = likelihood.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
   const Eigen::MatrixXd normal =
       base.transpose() * base + Eigen::MatrixXd::Identity(base.cols(), base.cols());  // with its prior
-  const Eigen::MatrixXd follow = normal.ldlt().solve(base.transpose() * own);
+  const Eigen::LDLT<Eigen::MatrixXd> solver = normal.ldlt();
+  const Eigen::MatrixXd follow = solver.solve(base.transpose() * own);
   own -= base * follow;
   Columns file = by_own_mechanisms(likelihood, fit);
-  file -= base * normal.ldlt().solve(base.transpose() * file);
+  file -= base * solver.solve(base.transpose() * file);
   const Eigen::MatrixXd with_file = own.transpose() * file,
                         known = file.transpose() * file + Eigen::MatrixXd::Identity(file.cols(), file.cols());
   Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(own.cols(), own.cols());

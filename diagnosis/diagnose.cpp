@@ -86,9 +86,7 @@ struct Errors {
 };
 
 Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const measurement::HealthyData& healthy) {
-  double largest_v = 0;
-  for (const measurement::HealthyBlock& b : healthy.blocks) largest_v = std::max(largest_v, b.error_v);
-  const double healthy_v = thresholds.healthy.gross_times * largest_v,
+  const double healthy_v = thresholds.healthy.gross_times * largest_error_v(healthy),
                tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), likelihood.cell().tolerance.ocv_v);
   return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, healthy_v),
           std::max(thresholds.decision.gross_v, healthy_v)};

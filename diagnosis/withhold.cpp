@@ -61,13 +61,13 @@ double error_of(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   return error.root();
 }
 
+}  // namespace
+
 double largest_error_v(const measurement::HealthyData& healthy) {
   double largest_v = 0;
   for (const measurement::HealthyBlock& b : healthy.blocks) largest_v = std::max(largest_v, b.error_v);
   return largest_v;
 }
-
-}  // namespace
 
 std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivors) {
   std::map<std::size_t, double> gains = grown.gains;

@@ -17,6 +17,9 @@ std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivo
 /// Gain of an unknown cause, on the scale of a mechanism's gain.
 double unknown_gain(const ResidualTest& residual);
 
+/// Largest RMS error that the cell file has on a healthy recording [V]; 0 without any.
+double largest_error_v(const measurement::HealthyData& healthy);
+
 class HealthyJudge {
  public:
   /// All must outlive it.
