@@ -18,6 +18,13 @@ const measurement::HealthyRegime* regime_at(const std::vector<measurement::Healt
   return nullptr;
 }
 
+/// Mean square error [V^2] of this file. The one that was measured left a part out: with n parts the error is 1 + 1/n
+/// times a part's own, with n - 1 of them 1 + 1/(n - 1) times. With a single part nothing is known of that.
+double of_all_parts_v2(const measurement::HealthyRegime& there) {
+  const double less = there.parts > 1 ? 1 - 1 / (there.parts * there.parts) : 1;
+  return less * there.high_v * there.high_v;
+}
+
 /// Returns true if the current goes beyond that of the healthy recordings.
 bool is_beyond(const PreparedRecording& record, const std::vector<measurement::HealthyBlock>& blocks) {
   measurement::HealthyRange here, healthy;
@@ -61,7 +68,7 @@ std::vector<double> predicted_sigma_v(const LikelihoodModel& likelihood, std::si
     const measurement::HealthyRegime* there = beyond ? nullptr : regime_at(healthy.regimes, soc[k]);
     double v2 = variance_v2[k];
     if (there != nullptr)
-      v2 = (limits.tolerance_counts * v2 + there->parts * there->high_v * there->high_v) /
+      v2 = (limits.tolerance_counts * v2 + there->parts * of_all_parts_v2(*there)) /
            (limits.tolerance_counts + there->parts);
     else if (!healthy.regimes.empty())
       v2 = std::pow(limits.tolerance_beyond, 2) * v2 + std::pow(healthy.beyond_tolerance_v, 2);

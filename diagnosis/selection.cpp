@@ -114,6 +114,7 @@ class Elimination {
       const bool alone = found_.best.hypothesis.added().size() == 1;
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
+      if (gain < 0 && begins_better(m, without)) return true;
       const bool credible = is_credible(m);
       if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
         reduced.push_back({scope_.expected.contains(m), gain, without});
@@ -128,7 +129,8 @@ class Elimination {
   }
 
   Survivors survivors() && {
-    while (drop_one_not_credible()) {
+    int starts = 0;
+    while (drop_one_not_credible() || (starts++ < numerics.search.elimination_rounds && begin_better())) {
     }
     for (const std::size_t m : found_.best.hypothesis.added()) {
       if (!found_.gains.contains(m)) found_.gains[m] = search_.gain(search_.without_one(found_.best, m), found_.best);
@@ -185,6 +187,32 @@ class Elimination {
     const bool seen =
         rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
     return seen && !is_too_large(m, rms_v);
+  }
+
+  /// begins_better() for each mechanism whose gain is not known.
+  bool begin_better() {
+    const std::vector<std::size_t> added = found_.best.hypothesis.added();
+    if (added.size() < 2) return false;
+    for (const std::size_t m : added) {
+      if (found_.gains.contains(m)) continue;
+      const HypothesisFit without = search_.without_one(found_.best, m);
+      found_.gains[m] = search_.gain(without, found_.best);
+      if (found_.gains[m] < 0 && begins_better(m, without)) {
+        found_.gains.clear();
+        return true;
+      }
+    }
+    return false;
+  }
+
+  /// A hypothesis with less that is better: the fit with more has ended in a minimum of its own. Returns true if it is
+  /// better from there, and has become the best.
+  bool begins_better(std::size_t m, const HypothesisFit& without) {
+    const std::vector<HypothesisFit> again = search_.one_more(without, {m});
+    if (again.empty() || search_.score(again.front()) > search_.score(found_.best) - selection_limits.better_start)
+      return false;
+    found_.best = again.front();
+    return true;
   }
 
   /// Returns true if a rival, or the same mechanisms from another start, has become the best.

@@ -64,7 +64,8 @@ void LikelihoodModel::run(const std::vector<model::MechanismValues<S>>& values, 
   arithmetic::in_widest_vectors([&] {
     for (std::size_t k = 0; k < r.size(); ++k) {
       const double duration_s = k == 0 ? 0 : r.time_s[k] - r.time_s[k - 1];
-      const S read_a = readings.current(k) - base.offset_a(record, r.time_s[k]);
+      S read_a = readings.current(k);
+      if (!(read_a == S(0))) read_a -= base.offset_a(record, r.time_s[k]);  // exactly 0: as in model::CurrentOffset
       base.before_row(simulation);
       row(k, simulation.step(r.time_s[k], duration_s, read_a, readings.temperature(k), adjust), simulation);
     }

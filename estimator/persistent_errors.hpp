@@ -172,7 +172,7 @@ class PersistentErrorsAsStates {
     counted_ = counted_ > Soc(0) ? most : Soc(-most);
   }
 
-  /// A current at rest measures the sensor's offset, except for what may flow at rest (noise.current_at_rest_a).
+  /// A current at rest measures the sensor's offset beyond the cell file's, except for what may flow at rest (noise.current_at_rest_a).
   template <class Cell>
   constexpr void update_offset_at_rest(State& state, const Cell& cell, const AcceptedCurrent& current,
                                        std::uint64_t step_us, const arithmetic::TimeStep<S>& duration_s) {
@@ -181,7 +181,8 @@ class PersistentErrorsAsStates {
     if (!at_rest_.is_at_rest(current.ua, step_us, cell.noise.at_rest)) return;
     const auto correlated_samples =
         arithmetic::ratio<Count>(arithmetic::Duration<S>(static_cast<int>(CurrentAtRest::correlation_s)), duration_s);
-    const Voltage read = arithmetic::ratio<Voltage>(arithmetic::from_micro<Current>(current.ua), cell.noise.one_c_a);
+    const Voltage read = arithmetic::ratio<Voltage>(
+        Current(laws_of(cell).true_current(arithmetic::from_micro<Current>(current.ua))), cell.noise.one_c_a);
     typename Model::MeasurementJacobian h{};
     h[Model::last] = arithmetic::VoltagePerSoc<S>(1);
     const Variance noise = arithmetic::product<Variance>(cell.noise.at_rest_per_h2,

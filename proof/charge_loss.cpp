@@ -110,10 +110,14 @@ class NoLoss : public Procedure {
 std::vector<ChargeLoss> read_charge_losses(files::TomlTable& file) {
   std::vector<ChargeLoss> losses;
   for (files::TomlTable& table : file.tables("loss")) {
-    ChargeLoss& loss = losses.emplace_back(ChargeLoss{read_parameter_name(table), false});
+    ChargeLoss& loss = losses.emplace_back(ChargeLoss{read_parameter_name(table), LossTimes::hours});
     const std::string times = table.text("times");
-    if (times != "hours" && times != "charge") table.reject("times", "\"hours\" or \"charge\"");
-    loss.per_charge = times == "charge";
+    if (times == "charge")
+      loss.times = LossTimes::charge;
+    else if (times == "hours_read")
+      loss.times = LossTimes::hours_read;
+    else if (times != "hours")
+      table.reject("times", "\"hours\", \"hours_read\" or \"charge\"");
     table.finish();
   }
   return losses;
@@ -121,16 +125,21 @@ std::vector<ChargeLoss> read_charge_losses(files::TomlTable& file) {
 
 std::optional<Value> lost_charge_ah(const workflow::DiagnoseResult& r, const std::vector<ChargeLoss>& losses) {
   const measurement::Recording& recording = r.recordings.front().recording;
-  double charged_ah = 0;
-  for (std::size_t k = 1; k < recording.rows(); ++k)
-    charged_ah += std::max(0.0, recording.current_a[k]) * (recording.time_s[k] - recording.time_s[k - 1]) / 3'600;
+  double charged_ah = 0, hours_read = 0;
+  for (std::size_t k = 1; k < recording.rows(); ++k) {
+    const double hours = (recording.time_s[k] - recording.time_s[k - 1]) / 3'600;
+    charged_ah += std::max(0.0, recording.current_a[k]) * hours;
+    if (recording.current_a[k] != 0) hours_read += hours;
+  }
   const double hours = recording.duration_s() / 3'600;
   Value sum{0, 0};
   bool any = false;
   for (const ChargeLoss& loss : losses) {
     const auto v = value_of(r, loss.parameter);
     if (!v) continue;
-    const double factor = loss.per_charge ? charged_ah : hours;
+    const double factor = loss.times == LossTimes::charge  ? charged_ah
+                          : loss.times == LossTimes::hours ? hours
+                                                           : hours_read;
     sum.value += v->value * factor;
     sum.sigma = std::hypot(sum.sigma, v->sigma * factor);
     any = true;

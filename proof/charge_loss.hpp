@@ -10,10 +10,13 @@
 
 namespace bms::proof {
 
-/// A mechanism that loses charge: parameter times hours of the recording, or times the charge that went in.
+/// What a parameter is multiplied by. hours_read: those with another reading than exactly 0 (model::CurrentOffset).
+enum class LossTimes { hours, hours_read, charge };
+
+/// A mechanism that loses charge: its parameter times the hours of the recording, or times the charge that went in.
 struct ChargeLoss {
   ParameterName parameter;
-  bool per_charge = false;
+  LossTimes times = LossTimes::hours;
 };
 
 /// All [[loss]] of an experiment file. Throws BadInput.

@@ -1,4 +1,5 @@
-// The current sensor has an offset: I = I_read - b.
+// The current sensor has an offset: I = I_read - b. A reading of exactly 0 is none: a sensor with an offset reads the
+// offset when nothing flows. It is 0 where a dead band or an instrument that is off has put it, and stays 0.
 #pragma once
 
 #include "model/mechanism.hpp"
@@ -21,7 +22,9 @@ struct CurrentOffset {
     template <class Real>
     constexpr Law(const std::array<Real, 1>& p, double) : offset_a(Current<S>(p[0])) {}
 
-    constexpr Current<S> true_current(const Current<S>& read_a) const { return read_a - offset_a; }
+    constexpr Current<S> true_current(const Current<S>& read_a) const {
+      return read_a == Current<S>(0) ? read_a : Current<S>(read_a - offset_a);
+    }
   };
 };
 

@@ -12,7 +12,7 @@ struct TemperatureSensor {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"offset_k", "K", Role::strength, 0, -25, 25, Per::cell, "b"},
+      Parameter{"offset_k", "K", Role::strength, 0, -25, 25, Per::cell, "b; up to 5 K with its mounting is usual", 5},
       Parameter{"lag_s", "s", Role::strength, 0, 0, 3000, Per::cell, "time constant of the sensor's lag"},
   };
 
