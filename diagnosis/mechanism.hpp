@@ -137,6 +137,11 @@ struct DefaultKnowledge {
   static std::vector<std::vector<double>> far_starts(const MechanismSetting& /*s*/, const RecordingFacts& /*facts*/) {
     return {};
   }
+  /// Changes a hypothesis, whose last setting is this mechanism's, to a start that takes over a part of what another of
+  /// its mechanisms explains: where both must move at once, neither gains alone. Returns false if there is none.
+  static bool joint_start(std::vector<MechanismSetting>& /*all*/, const model::CellParameters<>& /*cell*/) {
+    return false;
+  }
   /// Bounds of a parameter in a fit. rc_s: time constant of the cell file's RC branch.
   static Bounds bounds(std::size_t /*parameter*/, Bounds file, double /*rc_s*/) { return file; }
   /// Returns true if the cell file and the temperature alone make it certain: it is then fitted first.
@@ -185,6 +190,7 @@ struct MechanismKnowledge {
   MechanismSetting (*start)(const SignatureFit&);
   std::optional<std::string> (*not_testable)(const TestConditions&);
   std::vector<std::vector<double>> (*far_starts)(const MechanismSetting&, const RecordingFacts&);
+  bool (*joint_start)(std::vector<MechanismSetting>&, const model::CellParameters<>&);
   Bounds (*bounds)(std::size_t, Bounds, double);
   bool (*expected)(const model::CellParameters<>&, const RecordingFacts&);
   double (*prior_gain)(const RecordingFacts&);

@@ -34,6 +34,7 @@ constexpr MechanismKnowledge knowledge() {
           .start = K::start,
           .not_testable = K::not_testable,
           .far_starts = K::far_starts,
+          .joint_start = K::joint_start,
           .bounds = K::bounds,
           .expected = K::expected,
           .prior_gain = K::prior_gain,

@@ -140,6 +140,10 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
         likelihood_.fit(with(around.hypothesis, start), around.calibration, numerics.fit.iterations, hopeless);
     if (other.cost < best.cost) best = std::move(other);
   }
+  if (const auto joint = joint_start(h)) {
+    HypothesisFit other = likelihood_.fit(*joint, around.calibration, numerics.fit.iterations, hopeless);
+    if (other.cost < best.cost) best = std::move(other);
+  }
   for (const Eigen::VectorXd& u : far_bases(around)) {
     const auto farther = far_start(h, u);
     if (!farther) continue;
@@ -153,6 +157,13 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
 
 std::array<Eigen::VectorXd, 2> Search::far_bases(const HypothesisFit& around) const {
   return {around.calibration, likelihood_.unchanged()};
+}
+
+std::optional<Hypothesis> Search::joint_start(Hypothesis h) const {
+  std::vector<MechanismSetting> added(h.settings.begin() + static_cast<std::ptrdiff_t>(h.own), h.settings.end());
+  if (!knowledge_of(added.back().index).joint_start(added, likelihood_.cell())) return std::nullopt;
+  std::copy(added.begin(), added.end(), h.settings.begin() + static_cast<std::ptrdiff_t>(h.own));
+  return h;
 }
 
 std::optional<Search::FarStart> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) const {
@@ -180,6 +191,7 @@ std::vector<char> Search::far_better(const HypothesisFit& around, const std::vec
   std::vector<char> better(candidates.size(), 0);
   measurement::in_parallel(candidates.size(), [&](std::size_t k) {
     if (candidates[k].gain >= candidate_limits.worth_a_fit) return;
+    if (joint_start(with(around.hypothesis, candidates[k].start))) better[k] = 1;
     for (std::size_t b = 0; b < bases.size() && better[k] == 0; ++b) {
       const auto far = far_start(with(around.hypothesis, candidates[k].start), bases[b]);
       if (far && far->cost < without[b] - candidate_limits.worth_a_fit) better[k] = 1;

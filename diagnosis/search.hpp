@@ -93,7 +93,10 @@ class Search {
   /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
   /// a mechanism is missing.
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;
-  /// By candidate: 1 if a far start is better where the signature, which is linear, sees nothing.
+  /// Where the last mechanism takes over a part of what another one explains; nothing if it has no such start.
+  std::optional<Hypothesis> joint_start(Hypothesis h) const;
+  /// By candidate: 1 if a far start is better where the signature, which is linear, sees nothing, or if there is a
+  /// joint start.
   std::vector<char> far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const;
   /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best) const;

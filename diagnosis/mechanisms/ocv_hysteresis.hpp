@@ -24,7 +24,8 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static constexpr bool report_limit = true;
   static constexpr Fact facts = Fact::reversals | Fact::rests;
   static constexpr std::size_t half_gap = 0, ocv_at = 2, initial = 3, measured = 4;  ///< places of the parameters
-  static constexpr double gap_share = 0.2;       ///< of the cell file's gap: so far a slow current's drop is in it
+  static constexpr double gap_share = 0.9, gap_sigma = 0.1;  ///< hysteresis over the cell file's gap, which contains a
+                                                             ///< slow current's drop: C/30 has a tenth to a fifth
   static constexpr double branch_sigma = 0.1;    ///< of the branch on which the cell file says that its OCV lies
   static constexpr double probing_share = 0.02;  ///< of the largest half gap: small enough to be linear
   static constexpr double smallest_start_v = 0.001, largest_start_v = 0.06;  ///< [V] half gap where a fit begins
@@ -46,7 +47,7 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
                                     const model::CellParameters<>& cell) {
     if (s.value[measured] < 1) return std::nullopt;
     const double gap_v = model::plateau_half_gap_v(cell.ocv);
-    if (parameter == half_gap && gap_v > 0) return Usual{gap_v, gap_share * gap_v};
+    if (parameter == half_gap && gap_v > 0) return Usual{gap_share * gap_v, gap_sigma * gap_v};
     if (parameter == ocv_at && (gap_v > 0 || cell.ocv.lean != 0)) return Usual{cell.ocv.lean, branch_sigma};
     return std::nullopt;
   }
