@@ -243,8 +243,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   if (options.healthy.known) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
     survivors = judge_healthy->without_withheld(std::move(survivors));
-    survivors = without_uncertain(search, likelihood, control, std::move(survivors));
   }
+  if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   d.unknown_gain = unknown_gain(adequacy.residual);

@@ -307,15 +307,18 @@ Survivors without_one(Search& search, const HypothesisFit& control, const Surviv
 }
 
 Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const HypothesisFit& control,
-                            Survivors found) {
+                            const Scope& scope, Survivors found) {
   for (;;) {
     likelihood.set_noise(found.best.noise);
     HypothesisFit with_error = found.best;
     include_model_error(likelihood, with_error);
-    const std::vector<std::size_t> added = with_error.hypothesis.added();
-    const auto weak = std::find_if(added.begin(), added.end(), [&](std::size_t m) { return is_weak(with_error, m); });
-    if (weak == added.end()) return found;
-    found = without_one(search, control, found, *weak);
+    std::size_t weakest = no_mechanism;
+    for (const std::size_t m : with_error.hypothesis.added()) {
+      if (scope.expected.contains(m) || !is_weak(with_error, m, scope.expected)) continue;
+      if (weakest == no_mechanism || found.gains[m] < found.gains[weakest]) weakest = m;
+    }
+    if (weakest == no_mechanism) return found;
+    found = without_one(search, control, found, weakest);
   }
 }
 

@@ -49,6 +49,7 @@ Survivors without_one(Search& search, const HypothesisFit& control, const Surviv
 
 /// Removes mechanisms whose strength the error of the model does not let stand: within two standard deviations of none
 /// where these contain it.
-Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const HypothesisFit& control, Survivors found);
+Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const HypothesisFit& control,
+                            const Scope& scope, Survivors found);
 
 }  // namespace bms::diagnosis

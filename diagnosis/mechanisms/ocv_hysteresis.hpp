@@ -26,8 +26,10 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static constexpr std::size_t half_gap = 0, ocv_at = 2, initial = 3, measured = 4;  ///< places of the parameters
   static constexpr double gap_share = 0.9, gap_sigma = 0.1;  ///< hysteresis over the cell file's gap, which contains a
                                                              ///< slow current's drop: C/30 has a tenth to a fifth
-  static constexpr double branch_sigma = 0.1;    ///< of the branch on which the cell file says that its OCV lies
-  static constexpr double probing_share = 0.02;  ///< of the largest half gap: small enough to be linear
+  static constexpr double lfp_gap_v = 0.0215, lfp_gap_sigma_v = 0.00925;  ///< [V] 3 to 40 mV are two sigma
+  static constexpr double plateau_v_per_soc = 0.2;  ///< slope of an LFP cell's OCV at half charge, at most
+  static constexpr double branch_sigma = 0.1;       ///< of the branch on which the cell file says that its OCV lies
+  static constexpr double probing_share = 0.02;     ///< of the largest half gap: small enough to be linear
   static constexpr double smallest_start_v = 0.001, largest_start_v = 0.06;  ///< [V] half gap where a fit begins
   static constexpr double smallest_throughput_soc = 0.03;                    ///< charge moved, over the capacity
 
@@ -42,11 +44,20 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static void choose_form(MechanismSetting& s, std::size_t form, const model::CellParameters<>&) {
     s.value[measured] = static_cast<double>(form);
   }
-  /// The gap of the cell file, and the branch on which its OCV lies.
+  static bool is_plateau(const model::OcvTable<double>& ocv) {
+    std::size_t piece = 0;
+    while (piece + 1 < ocv.b1_v.size && ocv.soc[piece + 1] <= numerics.middle_soc) ++piece;
+    return ocv.b1_v[piece] < plateau_v_per_soc;
+  }
+  /// The gap of the cell file, or that of most LFP cells for one with a curve of one direction, and the branch on which
+  /// its OCV lies.
   static std::optional<Usual> known(std::size_t parameter, const MechanismSetting& s,
                                     const model::CellParameters<>& cell) {
-    if (s.value[measured] < 1) return std::nullopt;
     const double gap_v = model::plateau_half_gap_v(cell.ocv);
+    const bool from_one = gap_v <= 0 && cell.ocv.lean != 0;
+    if (parameter == half_gap && from_one && is_plateau(cell.ocv)) return Usual{lfp_gap_v, lfp_gap_sigma_v};
+    // form 0 has one gap from empty to full, which is not that of the plateau
+    if (s.value[measured] < 1) return std::nullopt;
     if (parameter == half_gap && gap_v > 0) return Usual{gap_share * gap_v, gap_sigma * gap_v};
     if (parameter == ocv_at && (gap_v > 0 || cell.ocv.lean != 0)) return Usual{cell.ocv.lean, branch_sigma};
     return std::nullopt;

@@ -83,7 +83,11 @@ TEST(PredictedBand, WeighsHealthyRecordingsAgainstTheCellFile) {
   measurement::HealthyData healthy;
   healthy.regimes = {{"soc", 0.6, 0.8, 1, 0, 0.02, 0, 3, 0.03}};
   const auto [band_v, file_v] = band_and_file_v(healthy);
-  EXPECT_NEAR(band_v, std::sqrt((file_v * file_v + 3 * 0.03 * 0.03) / 4), 1e-9) << "three recordings and the file";
+  // two of three predicted the third: 1 + 1/2 of a recording's variance; three predict the next one: 1 + 1/3
+  const double of_three_v2 = 0.03 * 0.03 * (1 + 1.0 / 3) / (1 + 1.0 / 2);
+  EXPECT_NEAR(band_v, std::sqrt((file_v * file_v + 3 * of_three_v2) / 4), 1e-9) << "three recordings and the file";
+  healthy.regimes = {{"soc", 0.6, 0.8, 1, 0, 0.02, 0, 1, 0.03}};
+  EXPECT_NEAR(band_and_file_v(healthy)[0], std::sqrt((file_v * file_v + 0.03 * 0.03) / 2), 1e-9);
 }
 
 TEST(PredictedBand, IsWiderWhereNoHealthyRecordingWas) {

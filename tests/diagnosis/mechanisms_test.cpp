@@ -50,5 +50,20 @@ TEST(Mechanisms, FarStartsAreNotAboveTheUpperBound) {
   }
 }
 
+TEST(Mechanisms, ASlowPolarisationTakesOverMostOfR1InOneStart) {
+  const model::CellParameters<> cell = test::table9();
+  const std::size_t growth = model::mechanism_index_of<model::PolarisationGrowth>,
+                    slow = model::mechanism_index_of<model::SlowPolarisation>;
+  std::vector<MechanismSetting> all = {model::default_setting(slow, cell), model::default_setting(growth, cell)};
+  all[0].value[0] = 0.002;
+  ASSERT_TRUE(knowledge_of(growth).joint_start(all, cell));
+  const double r1_ohm = model::cell_detail::rc_value(cell.rc, cell.rc.r1_ohm, 0.5);
+  EXPECT_NEAR((1 + all[1].value[0]) * r1_ohm + all[0].value[0], r1_ohm + 0.002, 1e-12) << "a long load drops as much";
+  EXPECT_LT((1 + all[1].value[0]) * (1 + all[1].value[1]), 0.5) << "what stays in the RC pair is faster";
+  std::vector<MechanismSetting> alone = {all[1]};
+  EXPECT_FALSE(knowledge_of(growth).joint_start(alone, cell));
+  EXPECT_FALSE(knowledge_of(slow).joint_start(all, cell));
+}
+
 }  // namespace
 }  // namespace bms::diagnosis

@@ -309,7 +309,8 @@ Work work_after_a_rest(double sensor_a, double truly_a) {
 
 template <class S>
 auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& samples,
-                   const measurement::StartingPoint& start, double gain = 0) {
+                   const measurement::StartingPoint& start, double gain = 0,
+                   const std::vector<MechanismSetting>& of_file = {}) {
   using Estimator = SocEstimator<S, ExtendedRc<0, mechanism_state_count, true>::template Of>;
   auto parameters = tests::table9;
   parameters.noise.current_offset_a = 0.06;
@@ -317,11 +318,20 @@ auto run_with_rest(double at_rest_a, const std::vector<measurement::Sample>& sam
   parameters.noise.current_at_rest_a = at_rest_a;
   parameters.noise.current_gain = gain;
   parameters.noise.errors_are_states = true;
-  const Cells<S> cell{tests::prepared<S>(parameters), {}};
+  const Cells<S> cell{tests::prepared<S>(parameters), chosen<S>(of_file, capacity_ah)};
   Estimator estimator(start);
   std::vector<typename Estimator::Result> estimates;
   for (const measurement::Sample& s : samples) estimates.push_back(estimator.step(cell, s));
   return estimates;
+}
+
+TEST(ExtendedEstimator, LearnsNoOffsetAtRestThatTheCellFileKnows) {
+  std::vector<MechanismSetting> of_file{usual("current_offset")};
+  of_file.front().value = {0.05};
+  const Work w = work_after_a_rest(0.05, 0);
+  const auto e = run_with_rest<float>(0.012, w.samples, starting_at(0.6, 0.005), 0, of_file);
+  EXPECT_NEAR(6 * e[3'599].extra[1], 0, 0.005);
+  EXPECT_NEAR(e.back().soc, w.soc.back(), 0.002);
 }
 
 TEST(ExtendedEstimator, ReadsTheOffsetOfASensorWhileTheCircuitIsOpen) {

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <random>
+#include <vector>
 
 #include "arithmetic/dual_number.hpp"
 #include "arithmetic/vector_width.hpp"
@@ -95,6 +96,22 @@ void expect_no_effect(std::size_t index) {
     ASSERT_EQ(number(laws.advance(x, at, input, row.duration_s > 0)), 0);
     ASSERT_EQ(number(laws.reading(at.ocv_v)), number(at.ocv_v));
   }
+}
+
+template <class S>
+void expect_exact_zero_to_stay() {
+  std::vector<MechanismSetting> offset{usual("current_offset")};
+  offset.front().value = {0.25};
+  const auto laws = chosen<S>(offset, capacity_ah);
+  EXPECT_EQ(number(laws.true_current(Current<S>(0))), 0) << "no instrument with an offset reads it";
+  EXPECT_EQ(number(laws.true_current(Current<S>(0.25))), 0);
+  EXPECT_EQ(number(laws.true_current(Current<S>(-0.5))), -0.75);
+}
+
+TEST(CurrentOffset, LeavesAReadingOfExactlyZero) {
+  expect_exact_zero_to_stay<double>();
+  expect_exact_zero_to_stay<float>();
+  expect_exact_zero_to_stay<FixedPoint>();
 }
 
 TEST_P(EveryMechanism, ChangesNothingInAnyScalarWhileItsStrengthIsNeutral) {
