@@ -53,6 +53,40 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::
   return has_strength;
 }
 
+/// Quantile of chi square that is `own_sigmas` of a single strength, by Wilson and Hilferty (1931).
+double chi_square_of_own_sigmas(Eigen::Index strengths) {
+  const double share = 2 / (9 * static_cast<double>(strengths));
+  return static_cast<double>(strengths) *
+         std::pow(1 - share + numerics.statistics.normal_of_two_sigma * std::sqrt(share), 3);
+}
+
+/// Returns true if all strengths of a mechanism together are within two standard deviations of none, with those of
+/// `certain` mechanisms fixed: of two that share an effect neither is known alone. One at a bound does not count.
+bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain) {
+  const std::vector<ParameterRef> sought = f.hypothesis.sought();
+  std::vector<Eigen::Index> own, fixed;
+  std::vector<double> value;
+  for (std::size_t k = 0; k < sought.size(); ++k) {
+    const MechanismSetting& s = f.hypothesis.settings[sought[k].setting];
+    const model::Parameter& p = model::catalogue[s.index].parameter[sought[k].parameter];
+    if (s.index != mechanism) {
+      if (certain.contains(s.index)) fixed.push_back(static_cast<Eigen::Index>(k));
+    } else if (p.role == model::Role::strength && f.at_bound[k] == 0) {
+      own.push_back(static_cast<Eigen::Index>(k));
+      value.push_back(s.value[sought[k].parameter]);
+    }
+  }
+  if (own.empty() || !is_weak(f, mechanism, certain)) return is_weak(f, mechanism, certain);
+  Eigen::MatrixXd covariance = f.covariance(own, own);
+  if (!fixed.empty()) {
+    const Eigen::MatrixXd across = f.covariance(fixed, own);
+    covariance -= across.transpose() * Eigen::MatrixXd(f.covariance(fixed, fixed)).ldlt().solve(across);
+  }
+  const Eigen::Map<const Eigen::VectorXd> strengths(value.data(), static_cast<Eigen::Index>(value.size()));
+  const double away = strengths.dot(covariance.ldlt().solve(strengths));
+  return !(away >= chi_square_of_own_sigmas(strengths.size()));  // true for NaN
+}
+
 /// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
 bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
   if (mechanism != model::mechanism_index_of<model::CapacityChange>) return false;
@@ -314,7 +348,7 @@ Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const H
     include_model_error(likelihood, with_error);
     std::size_t weakest = no_mechanism;
     for (const std::size_t m : with_error.hypothesis.added()) {
-      if (scope.expected.contains(m) || !is_weak(with_error, m, scope.expected)) continue;
+      if (scope.expected.contains(m) || !is_uncertain(with_error, m, scope.expected)) continue;
       if (weakest == no_mechanism || found.gains[m] < found.gains[weakest]) weakest = m;
     }
     if (weakest == no_mechanism) return found;
