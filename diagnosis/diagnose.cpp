@@ -209,6 +209,8 @@ std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double
       s = extended.settings[k];
     else if (initial_soc > thresholds.facts.charged_soc)
       knowledge_of(s.index).after_full_charge(s);
+    else if (initial_soc < thresholds.facts.discharged_soc)
+      knowledge_of(s.index).after_full_discharge(s);
     later.push_back(s);
   }
   return later;

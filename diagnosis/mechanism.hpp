@@ -58,6 +58,7 @@ constexpr bool includes(Fact all, Fact one) { return (static_cast<unsigned>(all)
 struct TestConditions {
   const RecordingFacts& facts;
   bool follows_temperature = false;  ///< something that is there already follows the temperature
+  double temperature_sigma = 0;      ///< standard deviation of the cell file's temperature dependence, over its value
 
   bool current_below(double c) const { return facts.largest_a < c * facts.capacity_ah; }
 };
@@ -153,6 +154,8 @@ struct DefaultKnowledge {
   static bool carry_over(MechanismSetting& /*s*/) { return true; }
   /// Changes a setting to what holds after a full charge.
   static void after_full_charge(MechanismSetting& /*s*/) {}
+  /// The same after a full discharge.
+  static void after_full_discharge(MechanismSetting& /*s*/) {}
   /// Share of the cell file's capacity that is left.
   static double capacity_share(const MechanismSetting& /*s*/) { return 1; }
   /// Adds its law, or what takes the law's place, to the simulation of one recording.
@@ -196,6 +199,7 @@ struct MechanismKnowledge {
   double (*prior_gain)(const RecordingFacts&);
   bool (*carry_over)(MechanismSetting&);
   void (*after_full_charge)(MechanismSetting&);
+  void (*after_full_discharge)(MechanismSetting&);
   double (*capacity_share)(const MechanismSetting&);
 };
 

@@ -40,6 +40,7 @@ constexpr MechanismKnowledge knowledge() {
           .prior_gain = K::prior_gain,
           .carry_over = K::carry_over,
           .after_full_charge = K::after_full_charge,
+          .after_full_discharge = K::after_full_discharge,
           .capacity_share = K::capacity_share};
 }
 

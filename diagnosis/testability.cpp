@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/mechanisms/temperature_resistance.hpp"
 #include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
@@ -20,7 +21,14 @@ std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const
   const bool follows_temperature =
       std::any_of(given.settings.begin(), given.settings.end(),
                   [](const MechanismSetting& s) { return knowledge_of(s.index).follows_temperature; });
-  return knowledge.not_testable({.facts = facts, .follows_temperature = follows_temperature});
+  const MechanismSetting* law = nullptr;
+  for (std::size_t k = 0; k < given.own; ++k) {
+    if (given.settings[k].index == model::mechanism_index_of<model::TemperatureResistance>) law = &given.settings[k];
+  }
+  return knowledge.not_testable(
+      {.facts = facts,
+       .follows_temperature = follows_temperature,
+       .temperature_sigma = law == nullptr ? 0 : Knowledge<model::TemperatureResistance>::relative_sigma(*law)});
 }
 
 std::optional<std::string> no_information(const LikelihoodModel& likelihood) {

@@ -90,13 +90,16 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
     return true;
   }
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
+  static void after_full_discharge(MechanismSetting& s) { s.value[initial] = -1; }
   /// A finding's `initial` is the first recording's; each other recording has a start of its own. A full cell was
-  /// charged last.
+  /// charged last, an empty one discharged.
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
     model::MechanismValues<S> value = with;
     if ((setup.own || setup.record > 0) && setup.recording.initial_soc > thresholds.facts.charged_soc) {
       value[initial] = S(1);
+    } else if ((setup.own || setup.record > 0) && setup.recording.initial_soc < thresholds.facts.discharged_soc) {
+      value[initial] = S(-1);
     } else if (setup.own || setup.record > 0) {
       S start = setup.branch_shift + (setup.own ? number(value[initial]) : 0);
       if (number(start) > 1) start = S(1);

@@ -2,6 +2,10 @@
 // energy look alike, so the energy is taken from what is known of most cells.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
 #include <fmt/format.h>
 
 #include "diagnosis/mechanism.hpp"
@@ -21,6 +25,7 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
   static constexpr bool follows_temperature = true;
   static constexpr Fact facts = Fact::temperature;
   static constexpr std::size_t r0_energy = 0, r1_energy = 1, r0_share = 3;  ///< places of the parameters
+  static constexpr double infinite = std::numeric_limits<double>::infinity();
   static constexpr double smallest_difference_k = 3;  ///< [K] of span, or from the reference temperature
   static constexpr double certain_k = 8;     ///< [K] from the reference temperature where resistances must have changed
   static constexpr double prior_from_k = 5;  ///< [K] from the reference temperature where it becomes likely,
@@ -48,6 +53,12 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
       return fmt::format("the temperature is within {:.1f} K of the cell file's {:g} degrees C", c.facts.away_k,
                          c.facts.reference_c);
     return std::nullopt;
+  }
+  /// Standard deviation of the dependence over its value: of R0's or of R1's, whichever is known better. 0 if the cell
+  /// file states none.
+  static double relative_sigma(const MechanismSetting& s) {
+    const auto relative = [&](std::size_t p) { return s.value[p] > 0 ? s.deviation[p] / s.value[p] : infinite; };
+    return std::min(std::hypot(relative(r0_energy), relative(r0_share)), relative(r1_energy));
   }
   static bool expected(const model::CellParameters<>&, const RecordingFacts& seen) { return seen.away_k > certain_k; }
   static double prior_gain(const RecordingFacts& seen) {

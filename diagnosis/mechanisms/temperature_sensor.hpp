@@ -20,7 +20,9 @@ struct Knowledge<model::TemperatureSensor> : DefaultKnowledge<model::Temperature
   static constexpr Fact facts = Fact::temperature;
   static constexpr std::size_t offset = 0, lag = 1;  ///< places of the parameters
   static constexpr double significant_sigma = 2;     ///< standard deviations from which a lag is named,
-  static constexpr double noticeable_lag_s = 30;     ///< [s] if it is longer than this
+  static constexpr double largest_law_sigma = 0.3;  ///< of the file's temperature dependence, over its value: beyond it
+                                                    ///< an error of the law at another temperature looks the same
+  static constexpr double noticeable_lag_s = 30;    ///< [s] if it is longer than this
 
   static std::string claim(const MechanismSetting& s) {
     const char* high = s.value[offset] >= 0 ? "high" : "low";
@@ -32,6 +34,8 @@ struct Knowledge<model::TemperatureSensor> : DefaultKnowledge<model::Temperature
   static std::optional<std::string> not_testable(const TestConditions& c) {
     if (!c.facts.temperature) return "no temperature was recorded";
     if (!c.follows_temperature) return "nothing in the cell file follows the temperature";
+    if (c.temperature_sigma > largest_law_sigma)
+      return "the cell file does not know well how its resistances follow the temperature";
     return std::nullopt;
   }
   template <class S>

@@ -26,7 +26,7 @@ struct TemperatureResistance {
       Parameter{"r0_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 60000, Per::cell,
                 "E_0: of the reactions in R0, 40 to 60 kJ/mol; 5 to 30 kJ/mol if s is 1", 0, 50000, 10000},
       Parameter{"r1_activation_j_per_mol", "J/mol", Role::strength, 0, 0, 90000, Per::cell,
-                "E_1; 30 to 70 kJ/mol is usual", 70000},
+                "E_1; 30 to 60 kJ/mol: diffusion 20 to 40, reactions 40 to 60", 0, 45000, 15000},
       reference_temperature("temperature of the cell file's resistances"),
       Parameter{"r0_share", "1", Role::place, 1, 0.02, 1, Per::cell, "s: share of R0 that depends on the temperature"},
       Parameter{"more_at_10", "1", Role::given, 0, -1, 4, Per::cell, "D at 10 % SOC"},

@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "diagnosis/mechanisms/temperature_resistance.hpp"
 #include "diagnosis/texts.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
@@ -63,6 +64,27 @@ TEST(Mechanisms, ASlowPolarisationTakesOverMostOfR1InOneStart) {
   std::vector<MechanismSetting> alone = {all[1]};
   EXPECT_FALSE(knowledge_of(growth).joint_start(alone, cell));
   EXPECT_FALSE(knowledge_of(slow).joint_start(all, cell));
+}
+
+TEST(Mechanisms, ATemperatureSensorNeedsACellFileThatKnowsTheTemperature) {
+  RecordingFacts facts;
+  facts.temperature = true;
+  const auto testable = [&](double relative_sigma) {
+    const std::size_t sensor = model::mechanism_index_of<model::TemperatureSensor>;
+    return !knowledge_of(sensor)
+                .not_testable({.facts = facts, .follows_temperature = true, .temperature_sigma = relative_sigma})
+                .has_value();
+  };
+  EXPECT_TRUE(testable(0)) << "the file states no deviation";
+  EXPECT_TRUE(testable(0.1));
+  EXPECT_FALSE(testable(0.5));
+  // 50 +- 10 kJ/mol on 22 +- 9 % of R0, from a drive at one temperature; the extended file from drives at five
+  using Law = Knowledge<model::TemperatureResistance>;
+  MechanismSetting one{
+      model::mechanism_index_of<model::TemperatureResistance>, {50e3, 20e3, 25, 0.22}, {10e3, 8e6, 0, 0.09}};
+  EXPECT_NEAR(Law::relative_sigma(one), std::hypot(0.2, 0.09 / 0.22), 1e-9);
+  one.deviation[1] = 2e3;
+  EXPECT_NEAR(Law::relative_sigma(one), 0.1, 1e-9);
 }
 
 }  // namespace
