@@ -261,7 +261,8 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   include_model_error(likelihood, survivors.best);
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
-  d.findings = findings_of(search, survivors, contributed);
+  const auto healthy_gain = [&](std::size_t m) { return judge_healthy->gain_needed(m); };
+  d.findings = findings_of(search, survivors, contributed, judge_healthy ? HealthyGain(healthy_gain) : HealthyGain());
   add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
   const Errors errors = errors_of(search, likelihood, options.healthy);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);

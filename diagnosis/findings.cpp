@@ -32,7 +32,8 @@ std::size_t replacement_of(std::size_t m, const Hypothesis& rival, const Hypothe
   return other;
 }
 
-Finding finding_of(Search& search, const Survivors& survivors, std::size_t m) {
+/// healthy_gain: below it the mechanism does not stand out from healthy recordings; 0: there are none.
+Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, double healthy_gain) {
   const HypothesisFit& best = survivors.best;
   Finding f;
   f.setting = *best.hypothesis.find(m);
@@ -54,8 +55,9 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m) {
     weights += weight(behind);
     const auto alike = survivors.alike.find({m, other});
     const bool inseparable = alike != survivors.alike.end() && alike->second > finding_limits.inseparable;
-    if (behind < finding_limits.tie || (inseparable && behind < finding_limits.tie_inseparable))
-      equivalents.push_back({behind, other, &rival});
+    double reach = inseparable ? finding_limits.tie_inseparable : finding_limits.tie;
+    if (alike != survivors.alike.end() && alike->second > finding_limits.trades) reach = std::max(reach, healthy_gain);
+    if (behind < reach) equivalents.push_back({behind, other, &rival});
   }
   std::sort(equivalents.begin(), equivalents.end(), [](const Equivalent& a, const Equivalent& b) {
     return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism);
@@ -71,10 +73,12 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m) {
 
 }  // namespace
 
-std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed) {
+std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed,
+                                 const HealthyGain& healthy_gain) {
   std::vector<Finding> findings;
   for (const std::size_t m : survivors.best.hypothesis.added()) {
-    Finding& f = findings.emplace_back(finding_of(search, survivors, m));
+    Finding& f =
+        findings.emplace_back(finding_of(search, survivors, m, healthy_gain ? healthy_gain(m).value_or(0) : 0));
     if (contributed.rms_v.contains(m)) f.rms_contribution_v = contributed.rms_v.at(m);
   }
   std::stable_sort(findings.begin(), findings.end(),

@@ -2,6 +2,9 @@
 // fitted.
 #pragma once
 
+#include <cstddef>
+#include <functional>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/likelihood_model.hpp"
@@ -12,8 +15,13 @@
 
 namespace bms::diagnosis {
 
-/// One per mechanism of the best hypothesis, the largest gain first.
-std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed);
+/// Gain with which a mechanism stands out from healthy recordings; nothing if they are too few. Empty: there are none.
+using HealthyGain = std::function<std::optional<double>(std::size_t mechanism)>;
+
+/// One per mechanism of the best hypothesis, the largest gain first. Of two alike ones the worse is excluded only if it
+/// is worse by more than the error of the model makes healthy recordings look.
+std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed,
+                                 const HealthyGain& healthy_gain);
 
 /// The best hypothesis and its rivals; if it adds nothing, the mechanisms tried alone. The largest gain first. The
 /// share that each explains is of the cell file's error file_v [V] or, if the best adds nothing, of what the base
