@@ -87,6 +87,11 @@ constexpr Fraction<S> step_response_short(Fraction<S> x) {
     constexpr auto c = d::converted<typename d::ConstantOf<F>::type>(d::chebyshev);
     const F x2(x * x);  // in pairs (Estrin): half as long a chain of dependent operations as Horner's
     q = F((c[0] + F(x * c[1])) + F(x2 * F(c[2] + F(x * c[3]))));
+  } else if constexpr (std::same_as<F, double>) {
+    constexpr auto& c = d::taylor;
+    const F x2 = x * x, x4 = x2 * x2;
+    const auto four = [&](std::size_t k) { return (c[k] + x * c[k + 1]) + x2 * (c[k + 2] + x * c[k + 3]); };
+    q = four(0) + x4 * (four(4) + x4 * four(8));
   } else {
     q = F(d::taylor.back());
     for (std::size_t k = d::taylor.size() - 1; k-- > 0;) q = F(d::taylor[k]) + x * q;
@@ -99,6 +104,15 @@ template <class S>
 requires(!ManyNumbers<S>) constexpr Fraction<S> step_response(const Exponent<S>& x) {
   using F = Fraction<S>;
   if constexpr (Dual<S>) return exponential_detail::with_derivative(x, step_response<decltype(x.a)>(x.a));
+  if constexpr (std::same_as<F, double>) {  // without recursion, to be inlined
+    if (x > 32) return 1;
+    double halved = x;
+    int halvings = 0;
+    for (; halved > 0.25; halved *= 0.5) ++halvings;
+    double response = step_response_short<double>(halved);
+    for (; halvings > 0; --halvings) response *= 2 - response;
+    return response;
+  }
   if (x > Exponent<S>(0.25)) [[unlikely]] {
     if (x > Exponent<S>(32)) return F(1);
     const F half = step_response<S>(product<Exponent<S>>(x, F(0.5)));

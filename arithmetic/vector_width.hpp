@@ -5,6 +5,9 @@
 // as it would if a file were compiled for it. Host only.
 #pragma once
 
+#include <cstddef>
+#include <cstring>
+
 namespace bms::arithmetic {
 
 // BMS_ONE_VECTOR_WIDTH: for code that shall compile quickly.
@@ -40,6 +43,27 @@ void in_widest_vectors(const Work& work) {
     with_avx2(work);
   else
     for_any_processor(work);
+}
+
+/// SSE2 takes two halves. (A type argument would lose the attribute of a smaller alignment.)
+using FourDoubles [[gnu::vector_size(32)]] = double;
+inline constexpr std::size_t doubles_at_once = sizeof(FourDoubles) / sizeof(double);
+
+/// Some of a row of doubles, anywhere in memory. Value: FourDoubles or a double.
+template <class Value>
+struct Loaded {
+  Value value;
+
+  explicit Loaded(const double* from) { std::memcpy(&value, from, sizeof(Value)); }
+  void store(double* to) const { std::memcpy(to, &value, sizeof(Value)); }
+};
+
+/// Calls work.operator()<FourDoubles>(first) for each four of `count` doubles, then <double>(place) for those left.
+template <class Work>
+void each_register(std::size_t count, const Work& work) {
+  std::size_t k = 0;
+  for (; k + doubles_at_once <= count; k += doubles_at_once) work.template operator()<FourDoubles>(k);
+  for (; k < count; ++k) work.template operator()<double>(k);
 }
 
 }  // namespace bms::arithmetic

@@ -5,6 +5,8 @@
 
 #include <Eigen/Cholesky>
 
+#include "diagnosis/products.hpp"
+
 namespace bms::diagnosis {
 
 namespace {
@@ -34,13 +36,12 @@ Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit
 Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const Columns base = likelihood.calibration_derivatives(fit.hypothesis, fit.calibration);
   Columns own = likelihood.derivatives(fit.hypothesis, fit.calibration, fit.hypothesis.sought());
-  const Eigen::MatrixXd normal =
-      base.transpose() * base + Eigen::MatrixXd::Identity(base.cols(), base.cols());  // with its prior
+  const Eigen::MatrixXd normal = squared(base) + Eigen::MatrixXd::Identity(base.cols(), base.cols());  // with its prior
   const Eigen::LDLT<Eigen::MatrixXd> solver = normal.ldlt();
-  const Eigen::MatrixXd follow = solver.solve(base.transpose() * own);
+  const Eigen::MatrixXd follow = solver.solve(products(base, own));
   own -= base * follow;
   Columns file = by_own_mechanisms(likelihood, fit);
-  file -= base * solver.solve(base.transpose() * file);
+  file -= base * solver.solve(products(base, file));
   const Eigen::MatrixXd with_file = own.transpose() * file,
                         known = file.transpose() * file + Eigen::MatrixXd::Identity(file.cols(), file.cols());
   Eigen::MatrixXd pulls = Eigen::MatrixXd::Zero(own.cols(), own.cols());

@@ -1,5 +1,5 @@
 // Derivatives of the predicted voltage: dual numbers through the simulation.
-#include <algorithm>
+#include <array>
 
 #include "arithmetic/dual_number.hpp"
 #include "diagnosis/likelihood_model.hpp"
@@ -72,7 +72,7 @@ class CarriedStates {
  public:
   /// still: unknowns that move no state; they come first.
   CarriedStates(Eigen::Index states, Eigen::Index unknowns, Eigen::Index still)
-      : still_(still), states_(states, unknowns - still), next_(states_) {}
+      : still_(still), states_(Columns::Zero(states, unknowns - still)), next_(states_) {}
 
   void restart(Eigen::Index initial_soc_unknown, double initial_soc_size) {
     states_.setZero();
@@ -87,26 +87,37 @@ class CarriedStates {
   void step(const Jet& voltage, model::OpenLoopSimulation<Jet>& simulation, const std::vector<Pull>& pulls, Out out) {
     Eigen::Index count = 0;
     simulation.each_state([&](const Jet& state) {
-      auto to = next_.row(count++);
+      double* to = next_.row(count++).data();
       through_states(state, to);
       for (const Pull& p : pulls) {
         if (p.unknown >= still_) to[p.unknown - still_] += state.v[p.lever] * p.size;
       }
     });
     out.head(still_).setZero();
-    through_states(voltage, out.tail(states_.cols()));
+    through_states(voltage, out.data() + still_);
     for (const Pull& p : pulls) out[p.unknown] += voltage.v[p.lever] * p.size;
     states_.swap(next_);
   }
 
  private:
-  template <class Row>
-  void through_states(const Jet& of, Row to) const {
-    to.setZero();
+  void through_states(const Jet& of, double* to) const {
+    struct Share {
+      double by;
+      const double* from;
+    };
+    std::array<Share, decltype(Jet::v)::size()> shares;
+    constexpr std::array<double, arithmetic::doubles_at_once> zeros{};
+    std::size_t count = 0;
     for (Eigen::Index s = 0; s < states_.rows(); ++s) {
-      if (const double by = of.v[Lever::count + static_cast<std::size_t>(s)]; by != 0)
-        to += by * states_.row(s);  // most are 0
+      const double by = of.v[Lever::count + static_cast<std::size_t>(s)];
+      if (by != 0) shares[count++] = {by, states_.row(s).data()};  // most are 0
     }
+    arithmetic::each_register(static_cast<std::size_t>(states_.cols()), [&]<class Value>(std::size_t at) {
+      arithmetic::Loaded<Value> sum(zeros.data());
+      for (std::size_t k = 0; k < count; ++k)
+        sum.value += shares[k].by * arithmetic::Loaded<Value>(shares[k].from + at).value;
+      sum.store(to + at);
+    });
   }
 
   Eigen::Index still_;

@@ -10,6 +10,7 @@
 
 #include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/products.hpp"
 
 namespace bms::diagnosis {
 
@@ -135,10 +136,8 @@ void GaussNewton::derive() {
   if (derived_at_ == here()) return;
   derived_at_ = here();
   by_theta_ = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
-  for (Eigen::Index j = 0; j < m_; ++j) {
-    natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
-    by_theta_.col(j) *= natural_[j];
-  }
+  for (Eigen::Index j = 0; j < m_; ++j) natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
+  by_theta_ *= natural_.asDiagonal();
 }
 
 GaussNewton::NormalEquations GaussNewton::normal_equations() {
@@ -151,7 +150,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
   e.within_reach = e.u_gradient.dot(e.u_alone);
   if (m_ == 0) return e;
   Eigen::VectorXd gradient = j_theta.transpose() * fit_.residual;
-  Eigen::MatrixXd normal = j_theta.transpose() * j_theta;
+  Eigen::MatrixXd normal = squared(j_theta);
   for (Eigen::Index j = 0; j < m_; ++j) {
     const PriorDistance prior = parameters_.prior_distance(j, parameters_.of(fit_.hypothesis, j));
     if (prior.sigma == 0) continue;
@@ -159,7 +158,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
     gradient[j] -= prior.away * per;
     normal(j, j) += per * per;
   }
-  const Eigen::MatrixXd cross = j_u.transpose() * j_theta;
+  const Eigen::MatrixXd cross = products(j_u, j_theta);
   e.solved = around_->normal.solve(cross);
   schur_ = normal - cross.transpose() * e.solved;
   e.rhs = gradient - cross.transpose() * e.u_alone;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "arithmetic/vector_width.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/statistics.hpp"
@@ -137,21 +138,30 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
     whiten(0, {columns.data(), gains_.size()});
     return;
   }
-  Eigen::RowVectorXd fast = Eigen::RowVectorXd::Zero(columns.cols()), slow = fast, innovation = fast;
-  for (std::size_t k = 0; k < gains_.size(); ++k) {
-    const Gain& g = gains_[k];
-    auto row = columns.row(static_cast<Eigen::Index>(k));
-    if (g.weight > 0) {
-      innovation = row - fast - g.slow_size * slow;
-      fast = g.fast_decay * (fast + g.fast * innovation);
-      slow = g.slow_decay * (slow + g.slow * innovation);
-      row = g.weight * innovation;
-    } else {
-      fast *= g.fast_decay;
-      slow *= g.slow_decay;
-      row.setZero();
+  const auto count = static_cast<std::size_t>(columns.cols());
+  std::vector<double> fast(count), slow(count);
+  arithmetic::in_widest_vectors([&] {
+    for (std::size_t k = 0; k < gains_.size(); ++k) {
+      const Gain& g = gains_[k];
+      double* row = columns.data() + static_cast<Eigen::Index>(k) * columns.outerStride();
+      arithmetic::each_register(count, [&]<class Value>(std::size_t at) {
+        arithmetic::Loaded<Value> x(row + at), f(fast.data() + at), s(slow.data() + at);
+        if (g.weight > 0) {
+          const Value innovation = x.value - f.value - g.slow_size * s.value;
+          f.value = g.fast_decay * (f.value + g.fast * innovation);
+          s.value = g.slow_decay * (s.value + g.slow * innovation);
+          x.value = g.weight * innovation;
+        } else {
+          f.value *= g.fast_decay;
+          s.value *= g.slow_decay;
+          x.value = Value{};
+        }
+        x.store(row + at);
+        f.store(fast.data() + at);
+        s.store(slow.data() + at);
+      });
     }
-  }
+  });
 }
 
 void Whitener::whiten(std::size_t first, std::span<double> values) const {
@@ -163,12 +173,6 @@ void Whitener::whiten(std::size_t first, std::span<double> values) const {
     slow = g.slow_decay * (slow + g.slow * innovation);
     values[k] = g.weight * innovation;
   }
-}
-
-Eigen::MatrixXd squared(const Columns& columns) {
-  Eigen::MatrixXd product = Eigen::MatrixXd::Zero(columns.cols(), columns.cols());
-  product.selfadjointView<Eigen::Lower>().rankUpdate(columns.transpose());
-  return product.selfadjointView<Eigen::Lower>();
 }
 
 double quantisation_step(std::span<const double> values) {

@@ -54,9 +54,6 @@ double price_of_noise(const NoiseModel& noise, const NoiseModel& nominal);
 /// One column per signature, one row per sample.
 using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-/// columns' columns.
-Eigen::MatrixXd squared(const Columns& columns);
-
 /// Columns in, white columns out. Rows that are not usable give 0.
 class Whitener {
  public:

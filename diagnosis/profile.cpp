@@ -2,12 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/numerics.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -21,20 +21,44 @@ struct Place {
 };
 
 Place best_base(const LikelihoodModel& likelihood, const FitParameters& parameters, Hypothesis h, Eigen::VectorXd u) {
-  const auto cost_of = [&](const Eigen::VectorXd& at) {
-    return likelihood.residual(h, at).squaredNorm() + at.squaredNorm();
-  };
-  double least = cost_of(u);
+  Eigen::VectorXd residual = likelihood.residual(h, u);
+  double least = residual.squaredNorm() + u.squaredNorm();
   for (int step = 0; step < profile_steps; ++step) {
     const auto around = likelihood.linearised_at(h, u);
-    const Eigen::VectorXd moved = u + around->normal.solve(around->columns.transpose() * likelihood.residual(h, u) - u);
-    const double cost = cost_of(moved);
+    Eigen::VectorXd moved = u + around->normal.solve(around->columns.transpose() * residual - u);
+    residual = likelihood.residual(h, moved);
+    const double cost = residual.squaredNorm() + moved.squaredNorm();
     if (!(cost < least)) break;
     least = cost;
-    u = moved;
+    u = std::move(moved);
   }
   const double prior = parameters.prior(h);
   return {std::move(h), std::move(u), least + prior};
+}
+
+/// A parameter moved away from a fit.
+struct View {
+  Eigen::Index parameter;
+  double value, by;  ///< its value there; distance from the fit
+  double most;       ///< distance asked for; a bound may be nearer
+  bool near;         ///< one of those that give the width
+};
+
+std::vector<View> views_from(const HypothesisFit& fit, const FitParameters& parameters) {
+  std::vector<View> views;
+  for (Eigen::Index j = 0; j < parameters.size(); ++j) {
+    const ParameterRef& p = parameters.sought()[static_cast<std::size_t>(j)];
+    Hypothesis at = fit.hypothesis;
+    const double value = parameters.of(at, j), sigma = at.settings[p.setting].deviation[p.parameter];
+    if (p.parameter > 0 || parameters.is_shape(j) || !(sigma > 0)) continue;
+    for (const double times : profile_sigmas) {
+      for (const double sign : {-1.0, 1.0}) {
+        const double moved = parameters.clamped(j, value + sign * times * sigma);
+        views.push_back({j, moved, std::abs(moved - value), times * sigma, times == profile_sigmas.front()});
+      }
+    }
+  }
+  return views;
 }
 
 }  // namespace
@@ -43,28 +67,22 @@ HypothesisFit profiled(const LikelihoodModel& likelihood, HypothesisFit fit) {
   std::vector<double> widest(fit.hypothesis.sought().size(), 0);
   for (int round = 0; round < profile_rounds; ++round) {
     const FitParameters parameters(likelihood.cell(), fit.hypothesis);
-    std::optional<Place> better;
     std::fill(widest.begin(), widest.end(), 0);
-    for (Eigen::Index j = 0; j < parameters.size(); ++j) {
-      const ParameterRef& p = parameters.sought()[static_cast<std::size_t>(j)];
-      const double value = parameters.of(fit.hypothesis, j),
-                   sigma = fit.hypothesis.settings[p.setting].deviation[p.parameter];
-      if (p.parameter > 0 || parameters.is_shape(j) || !(sigma > 0)) continue;
-      for (const double times : profile_sigmas) {
-        for (const double sign : {-1.0, 1.0}) {
-          Hypothesis moved = fit.hypothesis;
-          parameters.of(moved, j) = parameters.clamped(j, value + sign * times * sigma);
-          const double by = std::abs(parameters.of(moved, j) - value);
-          Place place = best_base(likelihood, parameters, std::move(moved), fit.calibration);
-          const double rise = place.cost - fit.cost;
-          if (rise < 0 && (!better || place.cost < better->cost)) better = std::move(place);
-          if (rise > 0 && times == profile_sigmas.front())
-            widest[static_cast<std::size_t>(j)] =
-                std::max(widest[static_cast<std::size_t>(j)], std::min(by / std::sqrt(rise), times * sigma));
-        }
-      }
+    const std::vector<View> views = views_from(fit, parameters);
+    std::vector<Place> places(views.size());
+    measurement::in_parallel(views.size(), [&](std::size_t k) {
+      Hypothesis moved = fit.hypothesis;
+      parameters.of(moved, views[k].parameter) = views[k].value;
+      places[k] = best_base(likelihood, parameters, std::move(moved), fit.calibration);
+    });
+    const Place* better = nullptr;
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const double rise = places[k].cost - fit.cost;
+      if (rise < 0 && (better == nullptr || places[k].cost < better->cost)) better = &places[k];
+      double& width = widest[static_cast<std::size_t>(views[k].parameter)];
+      if (rise > 0 && views[k].near) width = std::max(width, std::min(views[k].by / std::sqrt(rise), views[k].most));
     }
-    if (!better) break;
+    if (better == nullptr) break;
     HypothesisFit other = likelihood.fit(better->hypothesis, better->calibration);
     if (!(other.cost < fit.cost - numerics.fit.within_reach)) break;
     fit = std::move(other);

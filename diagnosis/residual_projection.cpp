@@ -1,6 +1,7 @@
 #include "diagnosis/residual_projection.hpp"
 
 #include "diagnosis/numerics.hpp"
+#include "diagnosis/products.hpp"
 
 namespace bms::diagnosis {
 
@@ -14,35 +15,33 @@ ResidualProjection::ResidualProjection(const LikelihoodModel& likelihood, const 
   if (own_.cols() > 0) {
     Eigen::MatrixXd gram = squared(own_);
     for (Eigen::Index k = 0; k < gram.rows(); ++k) gram(k, k) += numerics.signatures.prior * (1 + gram(k, k));
-    const Eigen::MatrixXd both = own_.transpose() * base();
+    const Eigen::MatrixXd both = products(own_, base());
     normal.bottomRightCorner(own_.cols(), own_.cols()) = gram;
     normal.bottomLeftCorner(own_.cols(), bases) = both;
     normal.topRightCorner(bases, own_.cols()) = both.transpose();
   }
   normal_.compute(normal);
-  Eigen::VectorXd pull = along(residual_);
-  pull.head(bases) -= fit.calibration;
+  Eigen::VectorXd pull(all);
+  pull << base().transpose() * residual_ - fit.calibration, own_.transpose() * residual_;
   pulled_ = normal_.solve(pull);
 }
 
-template <class Matrix>
-Eigen::MatrixXd ResidualProjection::along(const Matrix& columns) const {
-  Eigen::MatrixXd products(base().cols() + own_.cols(), columns.cols());
-  products.topRows(base().cols()).noalias() = base().transpose() * columns;
-  if (own_.cols() > 0) products.bottomRows(own_.cols()).noalias() = own_.transpose() * columns;
-  return products;
+Eigen::MatrixXd ResidualProjection::along(const Columns& columns) const {
+  Eigen::MatrixXd both(base().cols() + own_.cols(), columns.cols());
+  both.topRows(base().cols()) = products(base(), columns);
+  if (own_.cols() > 0) both.bottomRows(own_.cols()) = products(own_, columns);
+  return both;
 }
 
 ResidualProjection::Products::Products(const ResidualProjection& by, const Columns& columns)
-    : columns_(columns),
+    : columns_(&columns),
       cross_(by.along(columns)),
       solved_(by.normal_.solve(cross_)),
+      gram_(squared(columns) - cross_.transpose() * solved_),
       toward_(columns.transpose() * by.residual_ - cross_.transpose() * by.pulled_) {}
 
-Eigen::MatrixXd ResidualProjection::Products::gram(Eigen::Index first, Eigen::Index count, Eigen::Index other,
-                                                   Eigen::Index others) const {
-  return columns_.middleCols(first, count).transpose() * columns_.middleCols(other, others) -
-         cross_.middleCols(first, count).transpose() * solved_.middleCols(other, others);
+Eigen::MatrixXd ResidualProjection::Products::with(const Products& other) const {
+  return products(*columns_, *other.columns_) - cross_.transpose() * other.solved_;
 }
 
 }  // namespace bms::diagnosis

@@ -22,13 +22,16 @@ class ResidualProjection {
 
     const Eigen::VectorXd& toward() const { return toward_; }
     /// Of `count` neighbouring columns.
-    Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const { return gram(first, count, first, count); }
-    /// Of some columns (rows of the result) and others.
-    Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count, Eigen::Index other, Eigen::Index others) const;
+    Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const {
+      return gram_.block(first, first, count, count);
+    }
+    /// Of these columns (rows of the result) and others.
+    Eigen::MatrixXd with(const Products& other) const;
 
    private:
-    const Columns& columns_;
+    const Columns* columns_;
     Eigen::MatrixXd cross_, solved_;  ///< known columns' products with them, and the known parameters that follow
+    Eigen::MatrixXd gram_;
     Eigen::VectorXd toward_;
   };
   /// columns: white, LikelihoodModel::samples() rows; they must outlive the result.
@@ -37,8 +40,7 @@ class ResidualProjection {
  private:
   const Columns& base() const { return around_->columns; }
   /// Products of the known columns with others: by the base parameters, then by the estimated parameters.
-  template <class Matrix>
-  Eigen::MatrixXd along(const Matrix& columns) const;
+  Eigen::MatrixXd along(const Columns& columns) const;
 
   Eigen::VectorXd residual_;
   std::shared_ptr<const LikelihoodModel::Linearisation> around_;

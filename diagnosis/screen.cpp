@@ -4,12 +4,14 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <optional>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "diagnosis/bursts.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -35,16 +37,25 @@ bool same_form(const MechanismSetting& a, const MechanismSetting& b) {
   return a.index == b.index;
 }
 
+std::vector<ResidualProjection::Products> products_of(const ResidualProjection& projection,
+                                                      const std::vector<Columns>& blocks) {
+  std::vector<std::optional<ResidualProjection::Products>> of(blocks.size());
+  measurement::in_parallel(blocks.size(), [&](std::size_t k) { of[k].emplace(projection.of(blocks[k])); });
+  std::vector<ResidualProjection::Products> products;
+  for (auto& p : of) products.push_back(std::move(*p));
+  return products;
+}
+
 }  // namespace
 
 Eigen::VectorXd Screen::toward(const Probe& probe) const {
-  return products_.toward().segment(probe.first, static_cast<Eigen::Index>(probe.parameters.size()));
+  return products_[probe.block].toward().segment(probe.first, static_cast<Eigen::Index>(probe.parameters.size()));
 }
 
 void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   const std::size_t mechanism = p.setting.index;
   const double capacity_ah = likelihood.cell().capacity_ah;
-  Eigen::MatrixXd gram = products_.gram(p.first, static_cast<Eigen::Index>(p.parameters.size()));
+  Eigen::MatrixXd gram = products_[p.block].gram(p.first, static_cast<Eigen::Index>(p.parameters.size()));
   const Eigen::MatrixXd regular = with_ridge(gram);
   const Eigen::VectorXd found = regular.ldlt().solve(toward(p));  // its best strengths, to first order
   double gain = std::max(0.0, toward(p).dot(found));
@@ -103,7 +114,7 @@ void Screen::judge_bursts(const LikelihoodModel& likelihood, const HypothesisFit
   c.start.value[contact_resistance] = bursts.resistance_ohm;
   c.start.value[burst_share] = bursts.covered_s / std::max(likelihood.records().front().duration_s(), 1.0);
   if (c.gain <= 0) return;
-  best_.push_back({{c.start, {}, 0}, {}});
+  best_.push_back({{c.start, {}, 0, 0}, {}});
   candidates_.push_back(std::move(c));
 }
 
@@ -127,7 +138,7 @@ Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, c
 
 Screen::Screen(const LikelihoodModel& likelihood, const HypothesisFit& around, const std::vector<std::size_t>& over,
                const ResidualProjection& projection)
-    : signatures_(signatures(likelihood, around, over)), products_(projection.of(signatures_.columns)) {
+    : signatures_(signatures(likelihood, around, over)), products_(products_of(projection, signatures_.blocks)) {
   for (const Probe& p : signatures_.probes) judge(likelihood, p);
   for (const std::size_t mechanism : over) {
     if (knowledge_of(mechanism).signature != Signature::contact_bursts) continue;
@@ -150,7 +161,7 @@ double Screen::alike(std::size_t a, std::size_t b) const {
   const auto na = static_cast<Eigen::Index>(pa.parameters.size()), nb = static_cast<Eigen::Index>(pb.parameters.size());
   if (na == 0 || nb == 0) return 0;
   const Eigen::VectorXd x = with_ridge(shape_a.gram).ldlt().solve(toward(pa)),
-                        along = products_.gram(pb.first, nb, pa.first, na) * x;
+                        along = products_[pb.block].with(products_[pa.block]).block(pb.first, pa.first, nb, na) * x;
   const double norm = x.dot(shape_a.gram * x);
   Eigen::MatrixXd g = shape_b.gram;
   for (Eigen::Index i = 0; i < nb; ++i) g(i, i) *= 1 + signature_numerics.ridge_share;

@@ -55,7 +55,7 @@ class Screen {
   void sort();
 
   SignatureSet signatures_;
-  ResidualProjection::Products products_;  ///< of the signatures' columns
+  std::vector<ResidualProjection::Products> products_;  ///< of the signatures' blocks
   std::vector<Candidate> candidates_;
   std::vector<Shape> best_;  ///< of each candidate
   struct FormStart {

@@ -23,7 +23,7 @@ Derivatives derivatives_of(const LikelihoodModel& likelihood, const HypothesisFi
                            const MechanismSetting& setting) {
   const model::MechanismInfo& info = catalogue[setting.index];
   const Hypothesis probe = with(around.hypothesis, setting);
-  Derivatives d{{setting, {}, 0}, {}};
+  Derivatives d{{setting, {}, 0, 0}, {}};
   std::vector<ParameterRef> by;
   for (std::size_t k = 0; k < info.parameters; ++k) {
     const Role role = info.parameter[k].role;
@@ -41,10 +41,9 @@ class Collector {
   explicit Collector(const LikelihoodModel& likelihood) : likelihood_(likelihood) {}
 
   void add(Derivatives d) {
-    d.probe.first = count_;
-    count_ += d.columns.cols();
-    probes_.push_back(std::move(d.probe));
-    blocks_.push_back(std::move(d.columns));
+    d.probe.block = set_.blocks.size();
+    set_.probes.push_back(std::move(d.probe));
+    set_.blocks.push_back(std::move(d.columns));
   }
 
   /// A resistance from a moment on: the current after it, one column per moment of the first recording. Later
@@ -54,7 +53,6 @@ class Collector {
     const std::vector<PreparedRecording>& records = likelihood_.records();
     const PreparedRecording& first = records.front();
     Columns steps = Columns::Zero(static_cast<Eigen::Index>(likelihood_.samples()), moments);
-    const Eigen::Index from = count_;
     for (std::size_t m = 0; m < moments; ++m) {
       const std::size_t onset = (m + margin) * first.size() / (moments + 2 * margin);
       Eigen::Index row = 0;
@@ -66,28 +64,17 @@ class Collector {
       }
       MechanismSetting setting{mechanism, {}, {}};
       setting.value[contact_onset] = first.time_s[onset];
-      probes_.push_back({setting, {contact_resistance}, from + static_cast<Eigen::Index>(m)});
+      set_.probes.push_back({setting, {contact_resistance}, set_.blocks.size(), static_cast<Eigen::Index>(m)});
     }
     likelihood_.whiten(steps);
-    count_ += steps.cols();
-    blocks_.push_back(std::move(steps));
+    set_.blocks.push_back(std::move(steps));
   }
 
-  SignatureSet collected() && {
-    SignatureSet set{std::move(probes_), Columns(static_cast<Eigen::Index>(likelihood_.samples()), count_)};
-    Eigen::Index at = 0;
-    for (const Columns& block : blocks_) {
-      set.columns.middleCols(at, block.cols()) = block;
-      at += block.cols();
-    }
-    return set;
-  }
+  SignatureSet collected() && { return std::move(set_); }
 
  private:
   const LikelihoodModel& likelihood_;
-  std::vector<Probe> probes_;
-  std::vector<Columns> blocks_;
-  Eigen::Index count_ = 0;
+  SignatureSet set_;
 };
 
 }  // namespace

@@ -14,12 +14,13 @@ namespace bms::diagnosis {
 struct Probe {
   MechanismSetting setting;
   std::vector<std::size_t> parameters;  ///< those that vary, a column each
-  Eigen::Index first = 0;               ///< first column
+  std::size_t block = 0;                ///< of the set's columns
+  Eigen::Index first = 0;               ///< first column in it
 };
 
 struct SignatureSet {
   std::vector<Probe> probes;
-  Columns columns;  ///< white, LikelihoodModel::samples() rows
+  std::vector<Columns> blocks;  ///< white, LikelihoodModel::samples() rows
 };
 
 /// Settings at which the signature of a testable mechanism is taken: every shape of its grid, strengths just off a
