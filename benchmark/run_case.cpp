@@ -36,8 +36,8 @@ std::string figures_of(const diagnosis::Diagnosis& d) {
   if (d.law)
     figures += fmt::format(" law {} {:.2f}->{:.2f} mV x{:g}{}", d.law->law, 1e3 * d.law->left_out_before_v,
                            1e3 * d.law->left_out_after_v, d.law->times_tolerance, d.law->cell ? " term" : "");
-  for (const diagnosis::LawEvidence& e : d.law ? d.law->evidence : std::vector<diagnosis::LawEvidence>{})
-    figures += fmt::format(" {} by {} {:.0f}", e.law, e.depends_on, e.evidence);
+  for (const diagnosis::LawEvidence& e : d.law ? d.law->laws : std::vector<diagnosis::LawEvidence>{})
+    figures += fmt::format(" {} by {} {:.0f}", e.law, e.depends_on, e.gain);
   for (const diagnosis::Finding& f : d.findings) {
     figures += fmt::format(" | {} {:.0f}", id_of(f.setting.index), f.gain);
     for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p)

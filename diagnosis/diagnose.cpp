@@ -167,14 +167,14 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
 void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
   const bool doubtful = names(d.verdict) && !healthy;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
-  std::vector<LawEvidence> evidence = law_evidence(likelihood, nominal);
+  std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {
     double foreign = 0;
-    for (const LawEvidence& e : evidence) foreign = std::max(foreign, e.foreign);
+    for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
     if (foreign <= d.base_cost - d.best_cost) return;
     d.verdict = Verdict::unknown;
   }
-  d.law = learn_law_term(likelihood, nominal, std::move(evidence));
+  d.law = learn_law_term(likelihood, nominal, std::move(laws));
   if (d.law && d.law->cell) d.cell = *d.law->cell;
 }
 

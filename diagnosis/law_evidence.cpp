@@ -47,7 +47,7 @@ constexpr std::array<FamilyForm, 7> family_forms = {{
 constexpr std::size_t fast_sizes = evidence_limits.fast_s.size(), slow_sizes = evidence_limits.slow_s.size(),
                       late_rows = evidence_limits.late_rows;
 
-/// Columns that the generic ones do not have. Beside each time constant: of the load before.
+/// Columns that the generic ones do not have. For each time constant: of the load before.
 namespace column {
 constexpr auto fast_count = static_cast<Eigen::Index>(fast_sizes), slow_count = static_cast<Eigen::Index>(slow_sizes),
                late_count = 2 * static_cast<Eigen::Index>(late_rows);
@@ -59,8 +59,8 @@ constexpr Eigen::Index bent = 0,         // the load's size times the load
     warm = slow_size + 2 * slow_count,   // measured temperature, alone and with the load
     heated = warm + 2,                   // heat of the load, with the load
     late = heated + 1,                   // the load of neighbouring rows
-    counted = late + late_count,         // charge that was counted wrongly
-    all = counted + 3;
+    charged = late + late_count,         // charge that was counted wrongly: in, out, with the time
+    discharged = charged + 1, elapsed = discharged + 1, all = elapsed + 1;
 }  // namespace column
 
 constexpr std::array<LawForm, 9> extra_forms = {{
@@ -72,7 +72,7 @@ constexpr std::array<LawForm, 9> extra_forms = {{
     {"temperature", "temperature", column::warm, 2},
     {"temperature", "time", column::heated, 1},
     {"timing", "current", column::late, column::late_count},
-    {"charge", "time", column::counted, 3},
+    {"charge", "time", column::charged, column::all - column::charged},
 }};
 
 /// Filters of the load, one per time constant.
@@ -125,9 +125,9 @@ void fill_law_columns(const LikelihoodModel& likelihood, const HypothesisFit& fi
     put(column::warm, kelvin);
     put(column::warm + 1, kelvin * load);
     put(column::heated, heat * load);
-    put(column::counted, slope * charged);
-    put(column::counted + 1, slope * discharged);
-    put(column::counted + 2, slope * (r.time_s[row.k] - r.time_s.front()) / hours);
+    put(column::charged, slope * charged);
+    put(column::discharged, slope * discharged);
+    put(column::elapsed, slope * (r.time_s[row.k] - r.time_s.front()) / hours);
   });
   for (std::size_t k = 0; k < loads.size(); ++k) {
     for (std::size_t by = 1; by <= late_rows; ++by) {
@@ -170,15 +170,14 @@ double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
   return best;
 }
 
-void add_evidence(std::vector<LawEvidence>& found, const char* law, const char* depends_on, double evidence,
-                  bool foreign) {
+void add_evidence(std::vector<LawEvidence>& found, const char* law, const char* depends_on, double gain, bool foreign) {
   auto same =
       std::find_if(found.begin(), found.end(), [&](const LawEvidence& e) { return std::string_view(e.law) == law; });
   if (same == found.end()) same = found.insert(found.end(), {law, depends_on, 0, 0});
-  if (foreign) same->foreign = std::max(same->foreign, evidence);
-  if (evidence <= same->evidence) return;
+  if (foreign) same->foreign = std::max(same->foreign, gain);
+  if (gain <= same->gain) return;
   same->depends_on = depends_on;
-  same->evidence = evidence;
+  same->gain = gain;
 }
 
 /// Of the frequency that explains most, less what the best of so many explains by chance.
@@ -246,8 +245,7 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const H
     add_evidence(found, f.law, f.depends_on,
                  evidence_of(of_more.gram(f.first, f.count), of_more.toward().segment(f.first, f.count)), f.foreign);
   add_evidence(found, "voltage", "time", evidence_of_a_wave(likelihood, projection), true);
-  std::sort(found.begin(), found.end(),
-            [](const LawEvidence& a, const LawEvidence& b) { return a.evidence > b.evidence; });
+  std::sort(found.begin(), found.end(), [](const LawEvidence& a, const LawEvidence& b) { return a.gain > b.gain; });
   return found;
 }
 

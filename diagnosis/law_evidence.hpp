@@ -18,8 +18,8 @@ namespace bms::diagnosis {
 struct LawEvidence {
   const char* law;         ///< as LawTerm::law; "": a function of the time, which every law is
   const char* depends_on;  ///< soc, current, time, temperature, voltage
-  double evidence = 0;
-  double foreign = 0;  ///< evidence of the best form that no mechanism of the catalogue has
+  double gain = 0;         ///< the evidence
+  double foreign = 0;      ///< gain of the best form that no mechanism of the catalogue has
 };
 
 /// The largest first; the best form of each law.

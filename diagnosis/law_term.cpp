@@ -162,9 +162,9 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const N
 }
 
 std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
-                                      std::vector<LawEvidence> evidence) {
+                                      std::vector<LawEvidence> laws) {
   LawTerm term;
-  term.evidence = std::move(evidence);
+  term.laws = std::move(laws);
   const std::vector<PreparedRecording>& records = likelihood.records();
   if (std::any_of(records.begin(), records.end(), follows_in_leaps)) {
     term.law = "voltage";
@@ -172,8 +172,8 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
     return term;
   }
   const auto most =
-      std::find_if(term.evidence.begin(), term.evidence.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  if (most == term.evidence.end() || most->evidence < term_limits.least_evidence) return std::nullopt;
+      std::find_if(term.laws.begin(), term.laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
+  if (most == term.laws.end() || most->gain < term_limits.least_evidence) return std::nullopt;
   term.law = most->law;
   term.depends_on = {most->depends_on};
   for (const TableLaw& law : table_laws) {

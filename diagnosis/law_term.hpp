@@ -18,7 +18,7 @@
 namespace bms::diagnosis {
 
 struct LawTerm {
-  std::vector<LawEvidence> evidence;    ///< of all laws, the largest first
+  std::vector<LawEvidence> laws;        ///< all of them, the largest first
   std::string law;                      ///< ocv, ohmic, fast, slow, charge, temperature, voltage, timing
   std::vector<std::string> depends_on;  ///< soc, current, time, temperature, voltage
   double left_out_before_v = 0;         ///< RMS error on the parts left out, base parameters within their tolerance;
@@ -36,6 +36,6 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const N
 
 /// Nothing if no law has enough evidence.
 std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
-                                      std::vector<LawEvidence> evidence);
+                                      std::vector<LawEvidence> laws);
 
 }  // namespace bms::diagnosis

@@ -60,7 +60,7 @@ TEST(LawTerm, ADriftOfTheInstrumentIsNotLearnedAsALaw) {
 void expect_named(const char* law, const AddV& add_v) {
   const auto term = learned(add_v);
   ASSERT_TRUE(term) << law;
-  EXPECT_EQ(term->law, law) << "next: " << term->evidence[1].law << " " << term->evidence[1].evidence;
+  EXPECT_EQ(term->law, law) << "next: " << term->laws[1].law << " " << term->laws[1].gain;
   EXPECT_FALSE(term->cell) << law;
 }
 
