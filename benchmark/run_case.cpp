@@ -33,6 +33,11 @@ std::string figures_of(const diagnosis::Diagnosis& d) {
   std::string figures =
       fmt::format("base {:.0f} best {:.0f} remaining {:.0f} ({}) adequacy {:.2f} fast {:.2f} far {:.4f}", d.base_cost,
                   d.best_cost, d.remaining, d.remaining_goes_with, d.adequacy, d.fast_excess, d.far_out);
+  if (d.law)
+    figures += fmt::format(" law {} {:.2f}->{:.2f} mV x{:g}{}", d.law->law, 1e3 * d.law->left_out_before_v,
+                           1e3 * d.law->left_out_after_v, d.law->times_tolerance, d.law->cell ? " term" : "");
+  for (const diagnosis::LawEvidence& e : d.law ? d.law->laws : std::vector<diagnosis::LawEvidence>{})
+    figures += fmt::format(" {} by {} {:.0f}", e.law, e.depends_on, e.gain);
   for (const diagnosis::Finding& f : d.findings) {
     figures += fmt::format(" | {} {:.0f}", id_of(f.setting.index), f.gain);
     for (std::size_t p = 0; p < model::catalogue[f.setting.index].parameters; ++p)
@@ -96,11 +101,17 @@ Outcome run_case(const truth::Case& c) {
   for (const auto& set : o.sets) o.found.push_back(set.front());
   o.probability = d.findings.empty() ? 0 : d.findings.front().probability;
   o.figures = figures_of(d);
+  if (d.law) o.law = d.law->law;
+  o.has_term = d.law && d.law->cell;
 
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
-    holdout_v = diagnosis::predict(d.cell, diagnosis::later_recording(d.extended, c.holdout_initial_soc),
-                                   record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
+    // as the tool: without causes that were not named
+    const std::vector<diagnosis::MechanismSetting> named =
+        diagnosis::names(d.verdict) ? diagnosis::later_recording(d.extended, c.holdout_initial_soc)
+                                    : std::vector<diagnosis::MechanismSetting>{};
+    holdout_v =
+        diagnosis::predict(d.cell, named, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
   o.next = follow_up(c, cell, recording, d);

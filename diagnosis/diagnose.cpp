@@ -162,10 +162,19 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
   return limits_of(sigmas, adequacy.residual, capacity_ah, stands_out, gain_of_size);
 }
 
-/// Where an unknown cause sits, and the cell with a term for it.
-void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, Diagnosis& d) {
-  if (d.verdict != Verdict::unknown || d.interrupted) return;
-  d.law = learn_law_term(likelihood, nominal, d.remaining_goes_with);
+/// Where an unknown cause sits, and the cell with a term for it. What is named although a law that no mechanism
+/// changes explains more is unknown. With healthy recordings the catalogue is judged by them.
+void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
+  const bool doubtful = names(d.verdict) && !healthy;
+  if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
+  std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
+  if (doubtful) {
+    double foreign = 0;
+    for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
+    if (foreign <= d.base_cost - d.best_cost) return;
+    d.verdict = Verdict::unknown;
+  }
+  d.law = learn_law_term(likelihood, nominal, std::move(laws));
   if (d.law && d.law->cell) d.cell = *d.law->cell;
 }
 
@@ -271,9 +280,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
   add_numbers(adequacy, search.nominal_noise(), d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
   if (options.progress) options.progress(1, "done");
   return d;

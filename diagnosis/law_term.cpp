@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
@@ -19,23 +20,11 @@ constexpr const Thresholds::LawTerms& term_limits = thresholds.law_terms;
 struct TableLaw {
   const char* id;
   double Loosened::*loosened;
-  std::array<const char*, 2> depends_on;
 };
 constexpr std::array<TableLaw, 3> table_laws = {{
-    {"ocv", &Loosened::ocv, {"soc", nullptr}},
-    {"ohmic", &Loosened::r0, {"soc", "current"}},
-    {"fast", &Loosened::rc, {"soc", "time"}},
-}};
-
-/// Laws without a table that generic columns point to.
-struct FamilyLaw {
-  std::string_view family;
-  const char *law, *depends_on;
-};
-constexpr std::array<FamilyLaw, 3> family_laws = {{
-    {"the time", "charge", "time"},
-    {"the heat of the load", "temperature", "temperature"},
-    {"the load before", "fast", "time"},
+    {"ocv", &Loosened::ocv},
+    {"ohmic", &Loosened::r0},
+    {"fast", &Loosened::rc},
 }};
 
 /// Which part of a recording is left out: every third of so many equal blocks.
@@ -130,11 +119,26 @@ model::CellParameters<> cell_with_term(const LikelihoodModel& all, const NoiseMo
                                     {fit.calibration.data(), fit.calibration.data() + fit.calibration.size()});
 }
 
-std::optional<LawTerm> by_family(std::string_view family, double before_v) {
-  for (const FamilyLaw& f : family_laws) {
-    if (f.family == family) return LawTerm{f.law, {f.depends_on}, before_v, 0, 1, std::nullopt};
-  }
-  return std::nullopt;
+/// Learns the term of a law with a table, if it pays on what is left out.
+void learn_table(const LikelihoodModel& likelihood, const NoiseModel& nominal, const TableLaw& law, LawTerm& term) {
+  std::vector<Loosened> models = {Loosened{}};
+  for (const double times : term_limits.times_tolerance) models.push_back(loosened(law, times));
+  const std::vector<BlockErrors> errors = left_out(likelihood, nominal, models, short_blocks);
+  term.left_out_before_v = rms_v(errors.front());
+  double least_v = rms_v(errors.back());
+  for (std::size_t k = 1; k < errors.size(); ++k) least_v = std::min(least_v, rms_v(errors[k]));
+  std::size_t chosen = errors.size() - 1;  // the smallest factor that is as good as the best
+  while (rms_v(errors[chosen]) > term_limits.as_good * least_v) --chosen;
+  term.left_out_after_v = rms_v(errors[chosen]);
+  if (chosen == 0) return;
+  term.times_tolerance = term_limits.times_tolerance[chosen - 1];
+  if (!(term.left_out_after_v < term_limits.error_left * term.left_out_before_v)) return;
+  if (!improves(errors.front(), errors[chosen])) return;
+  const std::vector<BlockErrors> far = left_out(likelihood, nominal, {Loosened{}, models[chosen]}, long_blocks);
+  if (!(rms_v(far[1]) <= rms_v(far[0]))) return;
+  // a cell file does not accept every table, for example an OCV that falls
+  const model::CellParameters<> cell = cell_with_term(likelihood, nominal, models[chosen]);
+  if (model::first_fault(cell).what == nullptr) term.cell = cell;
 }
 
 }  // namespace
@@ -143,46 +147,38 @@ std::string_view name_of_law(const LawTerm& term) {
   if (term.law == "ocv") return "the open-circuit voltage";
   if (term.law == "ohmic") return "the resistance that acts at once";
   if (term.law == "fast") return "the polarisation within a minute";
+  if (term.law == "slow") return "a polarisation that lasts for minutes to hours";
   if (term.law == "charge") return "the counting of the charge";
+  if (term.law == "voltage") return "the reading of the voltage";
+  if (term.law == "timing") return "the time at which a channel is read";
   return "the effect of temperature";
 }
 
-std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
-                                      std::string_view family) {
-  const auto errors_of = [&](const std::vector<Loosened>& models, const Folds& folds) {
-    return left_out(likelihood, nominal, models, folds);
-  };
-  std::vector<Loosened> models = {Loosened{}};
-  for (const TableLaw& law : table_laws) models.push_back(loosened(law, term_limits.times_tolerance.front()));
-  const std::vector<BlockErrors> errors = errors_of(models, short_blocks);
-  const auto least = std::min_element(errors.begin() + 1, errors.end(),
-                                      [](const BlockErrors& a, const BlockErrors& b) { return rms_v(a) < rms_v(b); });
-  const double before_v = rms_v(errors.front());
-  if (!(rms_v(*least) < term_limits.error_left * before_v)) return by_family(family, before_v);
+std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const NoiseModel& nominal) {
+  const Hypothesis base = likelihood.base();
+  const LikelihoodModel plain(likelihood.cell(), base.settings, likelihood.records(), nominal, {},
+                              likelihood.learned());
+  return law_evidence(plain, plain.fit(base));
+}
 
-  const TableLaw& law = table_laws[static_cast<std::size_t>(least - errors.begin()) - 1];
-  LawTerm term{law.id, {}, before_v, rms_v(*least), term_limits.times_tolerance.front(), std::nullopt};
-  for (const char* on : law.depends_on) {
-    if (on != nullptr) term.depends_on.emplace_back(on);
+std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
+                                      std::vector<LawEvidence> laws) {
+  LawTerm term;
+  term.laws = std::move(laws);
+  const std::vector<PreparedRecording>& records = likelihood.records();
+  if (std::any_of(records.begin(), records.end(), follows_in_leaps)) {
+    term.law = "voltage";
+    term.depends_on = {"voltage"};
+    return term;
   }
-  std::vector<Loosened> others;
-  for (std::size_t k = 1; k < term_limits.times_tolerance.size(); ++k)
-    others.push_back(loosened(law, term_limits.times_tolerance[k]));
-  std::vector<BlockErrors> with = errors_of(others, short_blocks);
-  with.insert(with.begin(), *least);
-  double least_v = term.left_out_after_v;
-  for (const BlockErrors& e : with) least_v = std::min(least_v, rms_v(e));
-  std::size_t chosen = with.size() - 1;  // the smallest factor that is as good as the best
-  while (rms_v(with[chosen]) > term_limits.as_good * least_v) --chosen;
-  term.left_out_after_v = rms_v(with[chosen]);
-  term.times_tolerance = term_limits.times_tolerance[chosen];
-  if (!improves(errors.front(), with[chosen])) return term;
-  const Loosened free = loosened(law, term.times_tolerance);
-  const std::vector<BlockErrors> far = errors_of({Loosened{}, free}, long_blocks);
-  if (!(rms_v(far[1]) <= rms_v(far[0]))) return term;
-  // a cell file does not accept every table, for example an OCV that falls
-  const model::CellParameters<> cell = cell_with_term(likelihood, nominal, free);
-  if (model::first_fault(cell).what == nullptr) term.cell = cell;
+  const auto most =
+      std::find_if(term.laws.begin(), term.laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
+  if (most == term.laws.end() || most->gain < term_limits.least_evidence) return std::nullopt;
+  term.law = most->law;
+  term.depends_on = {most->depends_on};
+  for (const TableLaw& law : table_laws) {
+    if (term.law == law.id) learn_table(likelihood, nominal, law, term);
+  }
   return term;
 }
 

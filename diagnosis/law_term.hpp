@@ -1,9 +1,10 @@
 // Where an unknown cause sits, and a model of it: which law of the cell model must change, and by how much, for the
 // recordings to be explained where they were not used.
 //
-// The term is the change of one law's table over the state of charge: hat functions with a prior, as the calibration
-// has them (calibration.hpp), with a standard deviation several times the tolerance. The law and that factor are those
-// with the smallest error on parts of the recordings that are left out in turn.
+// The law is the one with the most evidence (law_evidence.hpp). The term is the change of its table over the state of
+// charge: hat functions with a prior, as the calibration has them (calibration.hpp), with a standard deviation several
+// times the tolerance. The factor is the one with the smallest error on parts of the recordings that are left out in
+// turn. Laws without a table have no term.
 #pragma once
 
 #include <optional>
@@ -11,14 +12,17 @@
 #include <string_view>
 #include <vector>
 
+#include "diagnosis/law_evidence.hpp"
 #include "diagnosis/likelihood_model.hpp"
 
 namespace bms::diagnosis {
 
 struct LawTerm {
-  std::string law;                      ///< ocv, ohmic, fast, charge, temperature
-  std::vector<std::string> depends_on;  ///< soc, current, time, temperature
-  double left_out_before_v = 0;         ///< RMS error on the parts left out, base parameters within their tolerance
+  std::vector<LawEvidence> laws;        ///< all of them, the largest first
+  std::string law;                      ///< ocv, ohmic, fast, slow, charge, temperature, voltage, timing
+  std::vector<std::string> depends_on;  ///< soc, current, time, temperature, voltage
+  double left_out_before_v = 0;         ///< RMS error on the parts left out, base parameters within their tolerance;
+                                        ///< 0: not learned
   double left_out_after_v = 0;          ///< with the term; 0: the law has no term
   double times_tolerance = 1;
   std::optional<model::CellParameters<>> cell;  ///< with the term in its tables; nothing: there is no term
@@ -27,9 +31,11 @@ struct LawTerm {
 /// The law in words.
 std::string_view name_of_law(const LawTerm& term);
 
-/// family: of generic columns that explains most (ResidualTest). Nothing if neither
-/// says more than that something is there.
+/// Of all laws by the cell file as it is, its base parameters within their tolerance.
+std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const NoiseModel& nominal);
+
+/// Nothing if no law has enough evidence.
 std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
-                                      std::string_view family);
+                                      std::vector<LawEvidence> laws);
 
 }  // namespace bms::diagnosis

@@ -355,12 +355,25 @@ struct Thresholds {
   /// A term for what no known cause explains (law_term.hpp).
   struct LawTerms {
     std::size_t folds = 3, blocks = 24;                  ///< of each recording: every third block is left out in turn
-    std::array<double, 3> times_tolerance = {20, 8, 3};  ///< of the law's tables; laws are compared at the first
-    double error_left = 0.8;       ///< share of the error on what was left out, below which a law is named by its term
+    std::array<double, 3> times_tolerance = {20, 8, 3};  ///< of the law's tables
+    double error_left = 0.8;       ///< share of the error on what was left out, below which a term pays
     double improves_sigmas = 1.5;  ///< mean improvement of the blocks left out over its standard deviation, at least
     std::size_t long_blocks = 6;   ///< a term must do no harm either where so long parts are left out: next to short
                                    ///< ones a drift of this recording looks like a law
     double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
+    std::array<double, 3> fast_s = {4, 15, 60},
+                          slow_s = {250, 1'000, 4'000};  ///< [s] time constants of the load before, as memory_s
+    std::size_t late_rows = 2;                           ///< by which a channel may come late or early
+    double middle_c = 25, swing_k = 10;  ///< temperature at which nothing changes, and a usual distance from it
+    double ahead_soc = 0.05;             ///< by which a part of the cell is ahead under the largest current
+    double slope_soc = 0.002;            ///< to either side, for the slope of the OCV
+    std::size_t leaps = 30;              ///< of a reading, needed to judge how it moves
+    double least_leap = 0.02;            ///< quantile of the leaps that counts as the smallest
+    double leap_steps = 2.5;     ///< of the resolution, which the smallest leap exceeds if a reading stands still
+    double leap_share = 0.3;     ///< of the median move, likewise
+    double same_v = 1e-9;        ///< [V] readings nearer to each other are equal
+    double least_evidence = 20;  ///< of a law that is named; none of 36 healthy cases has it (development 5)
+    double narrowest = 1.0 / 64, widest = 4;  ///< width of the strengths' prior, times free_v
   };
 
   RecordingFaults recording;

@@ -57,7 +57,7 @@ Experiment draw_experiment(const Kinds& kinds, bool demanding, plant::Random& ra
   return experiment;
 }
 
-Plan draw_plan(CaseKind case_kind, bool demanding, const Kinds& kinds, plant::Random& random) {
+Plan draw_plan(CaseKind case_kind, bool demanding, const Kinds& kinds, plant::Random& random, Strengths strengths) {
   Plan plan;
   plan.cell = draw_healthy_cell(random);
   plan.lab = draw_laboratory(plan.cell.capacity_ah, demanding, random);
@@ -81,7 +81,8 @@ Plan draw_plan(CaseKind case_kind, bool demanding, const Kinds& kinds, plant::Ra
   plan.effect_seed = random.bits();
   plan.instrument_seed = random.bits();
   for (std::size_t n = 0; n < kinds.size(); ++n)
-    plan.wanted.push_back(case_kind == CaseKind::pair ? log_between(random, 2.6, 8) : log_between(random, 0.5, 8));
+    plan.wanted.push_back(case_kind == CaseKind::pair ? log_between(random, 2.6, 8)
+                                                      : log_between(random, strengths.least, strengths.most));
   return plan;
 }
 
@@ -125,7 +126,7 @@ Recorded run_recording(const Plan& plan, const Kinds& kinds) {
 }
 
 struct HoldOut {
-  World world;
+  World healthy, world;
   MeasuredSeries measured;
   bool good = true;
 };
@@ -135,7 +136,8 @@ HoldOut run_holdout(const Plan& plan, const std::vector<ScaledEffect>& effects) 
   SocRange range = plan.later_range;
   HoldOut holdout;
   for (int run = 1; run <= most_runs; ++run) {
-    holdout.world = with_effects(make_world(plan.cell, plan.later_setting, range, true), effects);
+    holdout.healthy = make_world(plan.cell, plan.later_setting, range, true);
+    holdout.world = with_effects(holdout.healthy, effects);
     holdout.measured = observe(plan.cell, holdout.world);
     if (!narrow(range, holdout.measured.trace.soc)) return holdout;
   }
@@ -143,11 +145,11 @@ HoldOut run_holdout(const Plan& plan, const std::vector<ScaledEffect>& effects) 
   return holdout;
 }
 
-bool strength_wanted(CaseKind kind, const ScaledEffect& s) {
+bool strength_wanted(CaseKind kind, const ScaledEffect& s, double least) {
   if (kind == CaseKind::pair) return s.strength >= 2 && s.strength <= 12;
   // nobody would report a smaller amplitude, so at the smallest one the effect may be clearly visible
   const bool smallest = s.amplitude <= s.effect.drawn.least * 1.001;
-  return s.strength >= 0.45 && (s.strength <= 9 || smallest);
+  return s.strength >= 0.9 * least && (s.strength <= 9 || smallest);
 }
 
 /// Time and SOC where the difference exceeds 20 % of its maximum.
@@ -176,6 +178,9 @@ Answer answer_of(const Plan& plan, const Recorded& recorded, const Series& recor
     answer.ids.emplace_back(s.effect.kind->id);
     answer.strengths.push_back(s.strength);
     answer.amplitudes.push_back(s.amplitude);
+    for (const char* law : s.effect.kind->laws) {
+      if (law != nullptr) answer.laws.emplace_back(law);
+    }
     answer.repeats_in_holdout = answer.repeats_in_holdout && s.effect.kind->repeats_in_holdout;
   }
   if (!recorded.effects.empty()) {
@@ -219,15 +224,15 @@ Series run_test_plan(const HealthyCell& cell, const std::vector<ScaledEffect>& e
 
 }  // namespace
 
-Draft draw_draft(CaseKind kind, bool demanding, const Kinds& kinds, plant::Random& random) {
-  const Plan plan = draw_plan(kind, demanding, kinds, random);
+Draft draw_draft(CaseKind kind, bool demanding, const Kinds& kinds, plant::Random& random, Strengths strengths) {
+  const Plan plan = draw_plan(kind, demanding, kinds, random, strengths);
   const Recorded recorded = run_recording(plan, kinds);
   const HoldOut holdout = run_holdout(plan, recorded.effects);
 
   Draft draft;
   draft.good = recorded.good && holdout.good &&
                std::all_of(recorded.effects.begin(), recorded.effects.end(),
-                           [&](const ScaledEffect& s) { return strength_wanted(kind, s); });
+                           [&](const ScaledEffect& s) { return strength_wanted(kind, s, strengths.least); });
   Case& made = draft.made;
   made.recording = record(recorded.full, recorded.measured, plan.lab, plan.instrument_seed);
   made.holdout = record(holdout.world, holdout.measured, plan.lab, derived_seed(plan.instrument_seed, 1));
@@ -242,6 +247,8 @@ Draft draw_draft(CaseKind kind, bool demanding, const Kinds& kinds, plant::Rando
   made.holdout_initial_soc = std::round(200 * holdout.world.start_soc) / 200;
   made.answer = answer_of(plan, recorded, made.recording);
   made.answer.kind = kind;
+  if (kind == CaseKind::outside)
+    made.answer.holdout_effect_rms_v = rms(difference_v(plan.cell, holdout.healthy, {}, recorded.effects));
   return draft;
 }
 

@@ -12,7 +12,13 @@ struct Draft {
   bool good = true;  ///< false: a strength, the SOC range or the similarity of a pair is not as wanted
 };
 
+/// Strengths that are drawn for one effect, in detection limits.
+struct Strengths {
+  double least = 0.5, most = 8;
+};
+
 /// demanding: a null whose calibration, drift, currents and weather are near or beyond what the cell file knows.
-Draft draw_draft(CaseKind kind, bool demanding, const std::vector<const EffectKind*>& effects, plant::Random& random);
+Draft draw_draft(CaseKind kind, bool demanding, const std::vector<const EffectKind*>& effects, plant::Random& random,
+                 Strengths strengths = {});
 
 }  // namespace bms::benchmark::truth

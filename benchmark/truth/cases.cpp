@@ -57,12 +57,12 @@ std::vector<const EffectKind*> draw_kinds(const Slot& slot, std::size_t turn, pl
 
 /// The first good one of a few drafts. Without a good one: the first draft, or for a pair the one with the largest
 /// strength.
-Case draw_case(const Slot& slot, std::size_t turn, plant::Random& random) {
+Case draw_case(const Slot& slot, std::size_t turn, plant::Random& random, Strengths strengths = {}) {
   constexpr int most_drafts = 6;
   const bool demanding = slot.kind == CaseKind::null && slot.number % 3 == 0;
   Draft best;
   for (int k = 0; k < most_drafts; ++k) {
-    Draft next = draw_draft(slot.kind, demanding, draw_kinds(slot, turn, random), random);
+    Draft next = draw_draft(slot.kind, demanding, draw_kinds(slot, turn, random), random, strengths);
     const bool good = next.good;
     const bool stronger = next.made.answer.strength > best.made.answer.strength;
     if (k == 0 || good || (slot.kind == CaseKind::pair && stronger)) best = std::move(next);
@@ -71,13 +71,22 @@ Case draw_case(const Slot& slot, std::size_t turn, plant::Random& random) {
   return std::move(best.made);
 }
 
+std::uint64_t stream_of(Split split, std::uint64_t seed) {
+  return derived_seed(split == Split::development ? 0x6465'7665'6C6F'7000U : 0x6669'6E61'6C00'0000U, seed);
+}
+
+std::string name_of_case(Split split, std::size_t index) {
+  const std::string digits = std::to_string(index);
+  return (split == Split::development ? "development-" : "final-") +
+         std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+}
+
 }  // namespace
 
 std::size_t case_count(Split split) { return split == Split::development ? 120 : 240; }
 
 Case make_case(Split split, std::uint64_t seed, std::size_t index) {
-  const std::uint64_t stream =
-      derived_seed(split == Split::development ? 0x6465'7665'6C6F'7000U : 0x6669'6E61'6C00'0000U, seed);
+  const std::uint64_t stream = stream_of(split, seed);
   const Slot slot = slot_of(split, stream, index);
   plant::Random random(derived_seed(stream, index + 1));
   const std::size_t turn = static_cast<std::size_t>(stream % 1'009);
@@ -89,9 +98,17 @@ Case make_case(Split split, std::uint64_t seed, std::size_t index) {
     made.answer.ids = {fault.name};
     fault.apply(made.recording, made.holdout, made.answer, random);
   }
-  const std::string digits = std::to_string(index);
-  made.name = (split == Split::development ? "development-" : "final-") +
-              std::string(digits.size() < 3 ? 3 - digits.size() : 0, '0') + digits;
+  made.name = name_of_case(split, index);
+  return made;
+}
+
+Case make_outside_case(Split split, std::uint64_t seed, std::size_t index) {
+  constexpr std::uint64_t other_stream = 0x6F75'7473'6964'6500U;
+  constexpr Strengths visible = {.least = 2.2, .most = 8};
+  const std::uint64_t stream = derived_seed(stream_of(split, seed), other_stream);
+  plant::Random random(derived_seed(stream, index + 1));
+  Case made = draw_case({CaseKind::outside, index}, 0, random, visible);
+  made.name = name_of_case(split, index);
   return made;
 }
 

@@ -47,8 +47,10 @@ struct Answer {
   double effect_rms_v = 0;          ///< voltage with the effect minus without it, for the same measured current
   double noise_floor_v = 0;         ///< RMS of what noise, drift and converter add to the voltage
   std::string profile;
-  std::vector<double> amplitudes;  ///< one per id, in the unit that the effect's file states
-  bool repeats_in_holdout = true;  ///< false: the effect comes at other times in the hold-out
+  std::vector<double> amplitudes;   ///< one per id, in the unit that the effect's file states
+  bool repeats_in_holdout = true;   ///< false: the effect comes at other times in the hold-out
+  std::vector<std::string> laws;    ///< outside the catalogue: each of them names the effect rightly
+  double holdout_effect_rms_v = 0;  ///< as effect_rms_v, in the hold-out
 };
 
 /// A test that is run on purpose. Columns of equal length.
@@ -75,5 +77,9 @@ enum class Split { development, final };
 
 std::size_t case_count(Split split);
 Case make_case(Split split, std::uint64_t seed, std::size_t index);
+
+/// An effect outside the catalogue with 2 to 8 detection limits; all of them in turn, without an end. The random stream
+/// is another one than that of make_case.
+Case make_outside_case(Split split, std::uint64_t seed, std::size_t index);
 
 }  // namespace bms::benchmark::truth

@@ -3,6 +3,7 @@
 // Each file of effects/ defines one EffectKind; effects.cpp collects them in a table.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <vector>
@@ -66,6 +67,8 @@ struct EffectKind {
   bool needs_steady_ambient = false;  ///< the ambient temperature stays at 25 degrees C
   bool needs_other_effect = false;    ///< it shows only in a cell that has the other effect of the pair
   bool repeats_in_holdout = true;     ///< a model of the recording can predict it in the hold-out
+  std::array<const char*, 2> laws{};  ///< outside the catalogue: the law of a cell or channel that it changes, or both
+                                      ///< if two say the same (README.md)
 };
 
 /// Experiments without a preference: every profile.

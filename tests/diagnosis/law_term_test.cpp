@@ -2,7 +2,9 @@
 // on a recording that was not used.
 #include "diagnosis/law_term.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -18,7 +20,7 @@ using AddV = std::function<double(std::size_t, double, double)>;
 std::optional<LawTerm> learned(const AddV& add_v) {
   const LikelihoodModel likelihood =
       likelihood_model_of(test::table9(), {}, {test::recorded(test::drive(2, 31), 0.75, 31, add_v)});
-  return learn_law_term(likelihood, likelihood.noise(), "");
+  return learn_law_term(likelihood, likelihood.noise(), law_evidence(likelihood, likelihood.noise()));
 }
 
 double error_v(const model::CellParameters<>& cell, const PreparedRecording& record) {
@@ -53,6 +55,68 @@ TEST(LawTerm, ADriftOfTheInstrumentIsNotLearnedAsALaw) {
   const auto term =
       learned([](std::size_t row, double, double) { return 0.008 * std::sin(static_cast<double>(row) / 700); });
   EXPECT_FALSE(term && term->cell) << term->law << " " << term->left_out_before_v << " " << term->left_out_after_v;
+}
+
+/// No table has a term for these.
+void expect_named(const char* law, const AddV& add_v) {
+  const auto term = learned(add_v);
+  ASSERT_TRUE(term) << law;
+  EXPECT_EQ(term->law, law) << "next: " << term->laws[1].law << " " << term->laws[1].gain;
+  EXPECT_FALSE(term->cell) << law;
+}
+
+/// It follows the load's size within half an hour.
+AddV lift(double at_1c_v) {
+  return [at_1c_v, state = 0.0](std::size_t, double current_a, double) mutable {
+    state += (std::abs(current_a) / 6 - state) / 2'000;
+    return at_1c_v * std::pow(state, 1.7);
+  };
+}
+
+TEST(LawTerm, AVoltageThatStaysAfterACurrentInEitherDirectionIsASlowPolarisation) { expect_named("slow", lift(0.02)); }
+
+TEST(LawTerm, WhatExplainsLessThanALawThatNoMechanismChangesIsNotNamed) {
+  // a voltage that charging alone builds up: a mechanism explains most of it
+  for (const unsigned seed : {33U, 35U}) {
+    const AddV built_up = [state = 0.0](std::size_t, double current_a, double) mutable {
+      state += (std::max(current_a, 0.0) / 6 - state) / 1'000;
+      return 0.025 * std::tanh(state / 0.2);
+    };
+    const Diagnosis d =
+        diagnose(test::table9(), {}, {test::recorded(test::drive(2, seed), 0.75, seed, built_up)}, Options{});
+    EXPECT_EQ(d.verdict, Verdict::unknown) << seed;
+    EXPECT_FALSE(d.findings.empty()) << seed;
+    EXPECT_EQ(d.law ? d.law->law : "", "slow") << seed;
+  }
+}
+
+TEST(LawTerm, AnErrorThatFollowsTheReadingIsOneOfTheVoltmeter) {
+  // rather than of the OCV: a load moves the reading, but not the state of charge
+  const std::vector<double> current_a = test::drive(2, 31);
+  const PreparedRecording clean = test::recorded(current_a, 0.75, 31);
+  expect_named("voltage", [&](std::size_t row, double, double) {
+    return 0.006 * std::sin(2 * 3.14159265 * clean.voltage_v[row] / 0.05);
+  });
+}
+
+TEST(LawTerm, APeriodThatTheLoadDoesNotHaveIsOneOfTheVoltmeter) {
+  expect_named("voltage", [](std::size_t row, double, double) {
+    return 0.004 * std::sin(2 * 3.14159265 * static_cast<double>(row) / 450);
+  });
+}
+
+TEST(LawTerm, AReadingThatStandsStillUntilTheVoltageHasMovedIsKnownByItsLeaps) {
+  const PreparedRecording healthy = test::recorded(test::drive(2, 31), 0.75, 31);
+  PreparedRecording sticking = healthy, coarse = healthy;
+  for (std::size_t k = 0; k < healthy.size(); ++k) {
+    coarse.voltage_v.edit()[k] = 0.01 * std::round(healthy.voltage_v[k] / 0.01);
+    const double fine_v = 0.001 * std::round(healthy.voltage_v[k] / 0.001),
+                 before_v = k > 0 ? sticking.voltage_v[k - 1] : fine_v;
+    sticking.voltage_v.edit()[k] = std::abs(fine_v - before_v) > 0.008 ? fine_v : before_v;
+  }
+  EXPECT_TRUE(follows_in_leaps(sticking));
+  EXPECT_FALSE(follows_in_leaps(healthy));
+  EXPECT_FALSE(follows_in_leaps(coarse));
 }
 
 TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }

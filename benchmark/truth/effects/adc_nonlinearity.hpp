@@ -22,6 +22,8 @@ inline constexpr EffectKind adc_nonlinearity = {
     .acts_on = ActsOn::voltage,
     .experiment = [](plant::Random&) { return any_profile(); },
     .draw = draw_adc_nonlinearity,
+    // A function of the reading itself. The same sine over the OCV is right without a load alone.
+    .laws = {"voltage"},
 };
 
 }  // namespace bms::benchmark::truth::effects

@@ -23,6 +23,8 @@ inline constexpr EffectKind memory_bump = {
           return Experiment{.profiles = {Profile::hppc, Profile::full_cycle, Profile::storage}};
         },
     .draw = draw_memory_bump,
+    // A function of the SOC until a charge removes it.
+    .laws = {"ocv"},
 };
 
 }  // namespace bms::benchmark::truth::effects

@@ -20,6 +20,9 @@ inline constexpr EffectKind parallel_imbalance = {
           return Experiment{.profiles = {Profile::full_cycle, Profile::minor_loops, Profile::hppc}};
         },
     .draw = draw_parallel_imbalance,
+    // Together both cells have the resistances and the OCV of one cell at rest. The misfit is the charge that flows
+    // between them after the load, within minutes to hours.
+    .laws = {"slow"},
 };
 
 }  // namespace bms::benchmark::truth::effects

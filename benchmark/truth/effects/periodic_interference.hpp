@@ -28,6 +28,8 @@ inline constexpr EffectKind periodic_interference = {
     .acts_on = ActsOn::voltage,
     .experiment = [](plant::Random&) { return any_profile(); },
     .draw = draw_periodic_interference,
+    // It comes with the voltage channel, whatever the cell does.
+    .laws = {"voltage"},
 };
 
 }  // namespace bms::benchmark::truth::effects

@@ -26,6 +26,8 @@ inline constexpr EffectKind plating_relaxation = {
               .profiles = {Profile::full_cycle, Profile::minor_loops, Profile::storage, Profile::many_cycles}};
         },
     .draw = draw_plating_relaxation,
+    // A voltage that follows the charging current within 400 to 3,600 s and then decays.
+    .laws = {"slow"},
 };
 
 }  // namespace bms::benchmark::truth::effects

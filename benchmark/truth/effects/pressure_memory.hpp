@@ -22,6 +22,8 @@ inline constexpr EffectKind pressure_memory = {
                             .current_scale = 1.3};
         },
     .draw = draw_pressure_memory,
+    // The OCV is lifted, and how much a state says that follows the current within an hour: both are true.
+    .laws = {"slow", "ocv"},
 };
 
 }  // namespace bms::benchmark::truth::effects

@@ -15,6 +15,9 @@ inline constexpr EffectKind sticky_converter = {
     .acts_on = ActsOn::voltage,
     .experiment = [](plant::Random&) { return any_profile(); },
     .draw = draw_sticky_converter,
+    // The voltage channel shows an old reading until the voltage has moved on: an error of that reading, or that it is
+    // late, are the same.
+    .laws = {"voltage", "timing"},
 };
 
 }  // namespace bms::benchmark::truth::effects
