@@ -363,17 +363,12 @@ struct Thresholds {
     double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
     std::array<double, 3> fast_s = {4, 15, 60},
                           slow_s = {250, 1'000, 4'000};  ///< [s] time constants of the load before, as memory_s
-    std::size_t late_rows = 2;                           ///< by which a channel may come late or early
-    double middle_c = 25, swing_k = 10;  ///< temperature at which nothing changes, and a usual distance from it
-    double ahead_soc = 0.05;             ///< by which a part of the cell is ahead under the largest current
-    double slope_soc = 0.002;            ///< to either side, for the slope of the OCV
-    std::size_t leaps = 30;              ///< of a reading, needed to judge how it moves
-    double least_leap = 0.02;            ///< quantile of the leaps that counts as the smallest
-    double leap_steps = 2.5;     ///< of the resolution, which the smallest leap exceeds if a reading stands still
-    double leap_share = 0.3;     ///< of the median move, likewise
-    double same_v = 1e-9;        ///< [V] readings nearer to each other are equal
-    double least_evidence = 20;  ///< of a law that is named; none of 36 healthy cases has it (development 5)
-    double narrowest = 1.0 / 64, widest = 4;  ///< width of the strengths' prior, times free_v
+    std::size_t late_rows = 2, leaps = 30;  ///< by which a channel comes late; moves of a reading needed to judge it
+    double middle_c = 25, swing_k = 10;     ///< temperature at which nothing changes, and a usual distance from it
+    double ahead_soc = 0.05, slope_soc = 0.002;  ///< by which a part of the cell is ahead; for the slope of the OCV
+    /// Quantile that counts as the smallest leap; what it exceeds, of the median move and in steps of the resolution.
+    double least_leap = 0.02, leap_share = 0.3, leap_steps = 2.5, same_v = 1e-9;
+    double least_evidence = 20, narrowest = 1.0 / 64, widest = 4;  ///< of a law (healthy: less); prior, times free_v
   };
 
   RecordingFaults recording;
