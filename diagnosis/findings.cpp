@@ -32,7 +32,7 @@ std::size_t replacement_of(std::size_t m, const Hypothesis& rival, const Hypothe
   return other;
 }
 
-/// healthy_gain: below it the mechanism does not stand out from healthy recordings; 0: there are none.
+/// healthy_gain: below it the mechanism does not stand out from healthy recordings; 0 without them.
 Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, double healthy_gain) {
   const HypothesisFit& best = survivors.best;
   Finding f;

@@ -15,7 +15,7 @@
 
 namespace bms::diagnosis {
 
-/// Gain with which a mechanism stands out from healthy recordings; nothing if they are too few. Empty: there are none.
+/// Gain with which a mechanism stands out from healthy recordings; nothing if they are too few. Empty without them.
 using HealthyGain = std::function<std::optional<double>(std::size_t mechanism)>;
 
 /// One per mechanism of the best hypothesis, the largest gain first. Of two alike ones the worse is excluded only if it

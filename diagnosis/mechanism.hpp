@@ -139,7 +139,7 @@ struct DefaultKnowledge {
     return {};
   }
   /// Changes a hypothesis, whose last setting is this mechanism's, to a start that takes over a part of what another of
-  /// its mechanisms explains: where both must move at once, neither gains alone. Returns false if there is none.
+  /// its mechanisms explains: where both must move at once, neither gains alone. Returns false without such a start.
   static bool joint_start(std::vector<MechanismSetting>& /*all*/, const model::CellParameters<>& /*cell*/) {
     return false;
   }

@@ -15,6 +15,7 @@ struct Statistics {
   double second_difference_variance = 6;     ///< of white noise with variance 1
   double uniform_variance_denominator = 12;  ///< a rounding error has variance step^2 / 12
   double chi_square_median = 0.4549;         ///< of one degree of freedom
+  double wilson_hilferty = 2.0 / 9;          ///< their factor
   double normal_of_two_sigma = 1.690;        ///< one-sided quantile at the probability of two sigma on both sides
 };
 

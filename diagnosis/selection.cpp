@@ -55,9 +55,9 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::
 
 /// Quantile of chi square that is `own_sigmas` of a single strength, by Wilson and Hilferty (1931).
 double chi_square_of_own_sigmas(Eigen::Index strengths) {
-  const double share = 2 / (9 * static_cast<double>(strengths));
-  return static_cast<double>(strengths) *
-         std::pow(1 - share + numerics.statistics.normal_of_two_sigma * std::sqrt(share), 3);
+  const double share = numerics.statistics.wilson_hilferty / static_cast<double>(strengths),
+               root = 1 - share + numerics.statistics.normal_of_two_sigma * std::sqrt(share);
+  return static_cast<double>(strengths) * root * root * root;
 }
 
 /// Returns true if all strengths of a mechanism together are within two standard deviations of none, with those of

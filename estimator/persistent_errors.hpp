@@ -172,7 +172,7 @@ class PersistentErrorsAsStates {
     counted_ = counted_ > Soc(0) ? most : Soc(-most);
   }
 
-  /// A current at rest measures the sensor's offset beyond the cell file's, except for what may flow at rest (noise.current_at_rest_a).
+  /// A current at rest measures the sensor's offset beyond the cell file's, except for what may flow at rest.
   template <class Cell>
   constexpr void update_offset_at_rest(State& state, const Cell& cell, const AcceptedCurrent& current,
                                        std::uint64_t step_us, const arithmetic::TimeStep<S>& duration_s) {

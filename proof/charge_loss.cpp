@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -131,15 +132,15 @@ std::optional<Value> lost_charge_ah(const workflow::DiagnoseResult& r, const std
     charged_ah += std::max(0.0, recording.current_a[k]) * hours;
     if (recording.current_a[k] != 0) hours_read += hours;
   }
-  const double hours = recording.duration_s() / 3'600;
+  const std::map<LossTimes, double> times = {{LossTimes::hours, recording.duration_s() / 3'600},
+                                             {LossTimes::hours_read, hours_read},
+                                             {LossTimes::charge, charged_ah}};
   Value sum{0, 0};
   bool any = false;
   for (const ChargeLoss& loss : losses) {
     const auto v = value_of(r, loss.parameter);
     if (!v) continue;
-    const double factor = loss.times == LossTimes::charge  ? charged_ah
-                          : loss.times == LossTimes::hours ? hours
-                                                           : hours_read;
+    const double factor = times.at(loss.times);
     sum.value += v->value * factor;
     sum.sigma = std::hypot(sum.sigma, v->sigma * factor);
     any = true;

@@ -1,5 +1,5 @@
-// The current sensor has an offset: I = I_read - b. A reading of exactly 0 is none: a sensor with an offset reads the
-// offset when nothing flows. It is 0 where a dead band or an instrument that is off has put it, and stays 0.
+// The current sensor has an offset: I = I_read - b. A reading of exactly 0 stays: a sensor with an offset reads the
+// offset when nothing flows, so that a dead band or an instrument that is off has put the 0 there.
 #pragma once
 
 #include "model/mechanism.hpp"
