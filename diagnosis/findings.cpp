@@ -56,11 +56,7 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, do
     const auto alike = survivors.alike.find({m, other});
     const bool inseparable = alike != survivors.alike.end() && alike->second > finding_limits.inseparable;
     double reach = inseparable ? finding_limits.tie_inseparable : finding_limits.tie;
-    if (alike != survivors.alike.end() && alike->second > finding_limits.trades) {
-      reach = std::max(reach, healthy_gain);
-      // how rare the other size is does not show in the recording
-      reach += std::max(0.0, search.cost_of_rarity(rival) - search.cost_of_rarity(best));
-    }
+    if (alike != survivors.alike.end() && alike->second > finding_limits.trades) reach = std::max(reach, healthy_gain);
     if (behind < reach) equivalents.push_back({behind, other, &rival});
   }
   std::sort(equivalents.begin(), equivalents.end(), [](const Equivalent& a, const Equivalent& b) {

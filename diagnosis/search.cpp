@@ -5,7 +5,6 @@
 #include <limits>
 #include <set>
 
-#include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
 
@@ -113,11 +112,6 @@ double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
   return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
-}
-
-double Search::cost_of_rarity(const HypothesisFit& f) const {
-  Hypothesis h = f.hypothesis;
-  return FitParameters(likelihood_.cell(), h).prior(h);
 }
 
 void Search::learn_totals(const std::vector<HypothesisFit>& fits) {

@@ -37,8 +37,6 @@ class Search {
 
   /// -2 log posterior with the cost of its unknowns, less the gain known beforehand: the smaller the better.
   double score(const HypothesisFit& f);
-  /// What the strengths cost because such sizes are rare, as a part of the score.
-  double cost_of_rarity(const HypothesisFit& f) const;
 
   /// Fitted again with the noise model that its own residual makes most probable.
   HypothesisFit with_own_noise(HypothesisFit f);
