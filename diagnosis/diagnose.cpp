@@ -162,10 +162,11 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
   return limits_of(sigmas, adequacy.residual, capacity_ah, stands_out, gain_of_size);
 }
 
-/// Where an unknown cause sits, and the cell with a term for it. What is named although a law that no mechanism
-/// changes explains more is unknown. With healthy recordings the catalogue is judged by them.
+/// Where an unknown cause sits, and the cell with a term for it. One or two causes that are named although a law that
+/// no mechanism changes explains more are unknown. A file that lacks three is plain: whatever it lacks looks foreign as
+/// well. With healthy recordings the catalogue is judged by them.
 void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
-  const bool doubtful = names(d.verdict) && !healthy;
+  const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= thresholds.law_terms.causes;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
   std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {

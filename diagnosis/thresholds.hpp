@@ -362,8 +362,8 @@ struct Thresholds {
     double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
     std::array<double, 3> fast_s = {4, 15, 60},
                           slow_s = {250, 1'000, 4'000};  ///< [s] time constants of the load before, as memory_s
-    std::size_t late_rows = 2, leaps = 30;  ///< by which a channel comes late; moves of a reading needed to judge it
-    double middle_c = 25, swing_k = 10;     ///< temperature at which nothing changes, and a usual distance from it
+    std::size_t late_rows = 2, leaps = 30, causes = 2;   ///< lateness tried; moves of a reading needed; causes doubted
+    double middle_c = 25, swing_k = 10;          ///< temperature at which nothing changes, and a usual distance from it
     double ahead_soc = 0.05, slope_soc = 0.002;  ///< by which a part of the cell is ahead; for the slope of the OCV
     /// Quantile that counts as the smallest leap; what it exceeds, of the median move and in steps of the resolution.
     double least_leap = 0.02, leap_share = 0.3, leap_steps = 2.5, same_v = 1e-9;
