@@ -87,6 +87,18 @@ bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<
   return !(away >= chi_square_of_own_sigmas(strengths.size()));  // true for NaN
 }
 
+/// Largest factor by which the variance of one of a mechanism's strengths is wider with the error of the model.
+double widening(const Hypothesis& narrow, const Hypothesis& wide, std::size_t mechanism) {
+  double most = 1;
+  for (const ParameterRef& p : narrow.sought()) {
+    const double was = narrow.settings[p.setting].deviation[p.parameter],
+                 is = wide.settings[p.setting].deviation[p.parameter];
+    if (narrow.settings[p.setting].index == mechanism && was > 0 && std::isfinite(is))
+      most = std::max(most, is / was * (is / was));
+  }
+  return most;
+}
+
 /// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
 bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
   if (mechanism != model::mechanism_index_of<model::CapacityChange>) return false;
@@ -349,6 +361,9 @@ Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const H
     std::size_t weakest = no_mechanism;
     for (const std::size_t m : with_error.hypothesis.added()) {
       if (scope.expected.contains(m) || !is_uncertain(with_error, m, scope.expected)) continue;
+      // far from an ellipse the deviations say less than the gain, which the error of the model makes too large as well
+      const double too_large = widening(found.best.hypothesis, with_error.hypothesis, m);
+      if (found.gains[m] > selection_limits.own_sigmas * selection_limits.own_sigmas * too_large) continue;
       if (weakest == no_mechanism || found.gains[m] < found.gains[weakest]) weakest = m;
     }
     if (weakest == no_mechanism) return found;
