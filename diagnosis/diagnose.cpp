@@ -210,16 +210,16 @@ const char* name_of(Verdict verdict) {
   return "";
 }
 
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc) {
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, std::optional<double> initial_soc) {
   std::vector<MechanismSetting> later;
   for (std::size_t k = 0; k < extended.settings.size(); ++k) {
     MechanismSetting s = extended.settings[k];
     if (!knowledge_of(s.index).carry_over(s)) continue;
     if (k < extended.own)
       s = extended.settings[k];
-    else if (initial_soc > thresholds.facts.charged_soc)
+    else if (initial_soc && *initial_soc > thresholds.facts.charged_soc)
       knowledge_of(s.index).after_full_charge(s);
-    else if (initial_soc < thresholds.facts.discharged_soc)
+    else if (initial_soc && *initial_soc < thresholds.facts.discharged_soc)
       knowledge_of(s.index).after_full_discharge(s);
     later.push_back(s);
   }

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "diagnosis/prepared_recording.hpp"
@@ -29,9 +30,9 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
                    std::vector<PreparedRecording> records, const Options& options = {});
 
 /// What holds for a later recording of the same cell and instruments: a contact that has changed stays so; when bursts
-/// fell and where the first recording began does not hold. initial_soc: at its start; a cell that is full was charged
-/// last.
-std::vector<MechanismSetting> later_recording(const Hypothesis& extended, double initial_soc = 0);
+/// fell and where the first recording began does not hold. initial_soc: at its start, if it is known; a cell that is
+/// full was charged last, an empty one discharged.
+std::vector<MechanismSetting> later_recording(const Hypothesis& extended, std::optional<double> initial_soc = {});
 
 /// Voltage that would be read in open loop from the record's initial soc [V]. soc: filled in unless nullptr.
 std::vector<double> predict(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,

@@ -211,6 +211,7 @@ TEST(Diagnose, WhereARecordingBeganIsNoPropertyOfTheCell) {
   const Hypothesis found{{truth}, 0, {}};
   EXPECT_EQ(later_recording(found).front().value[3], 0) << "a later recording begins elsewhere";
   EXPECT_EQ(later_recording(found, 0.97).front().value[3], 1) << "it was charged last";
+  EXPECT_EQ(later_recording(found, 0.03).front().value[3], -1) << "discharged last";
   EXPECT_EQ(later_recording({{truth}, 1, {}}).front().value[3], -0.8) << "a file that has it keeps it";
 }
 
