@@ -2,13 +2,10 @@
 // then the tables.
 //
 // Exit code: 0 done; 2 bad usage; 3 internal error
-#include <atomic>
 #include <cstdio>
-#include <exception>
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -21,6 +18,7 @@
 #include "files/bad_input.hpp"
 #include "files/committed_figures.hpp"
 #include "files/text_file.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace {
 
@@ -104,21 +102,15 @@ void run(const Options& options) {
     columns.push_back({method.name, std::vector<Outcome>(count)});
     if (options.no_baselines) break;
   }
-  std::atomic<std::size_t> next = 0;
   std::mutex printing;
-  const auto work = [&] {
-    for (std::size_t k = next++; k < count; k = next++) {
-      const truth::Case c = truth::make_case(split, options.seed, options.first + k);
-      if (!options.kind.empty() && options.kind != truth::name_of(c.answer.kind)) continue;
-      for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
-      const std::scoped_lock lock(printing);
-      fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
-      std::fflush(stdout);
-    }
-  };
-  std::vector<std::thread> threads;
-  for (unsigned k = 0; k < std::max(1U, std::thread::hardware_concurrency()); ++k) threads.emplace_back(work);
-  for (std::thread& t : threads) t.join();
+  bms::measurement::in_parallel(count, [&](std::size_t k) {
+    const truth::Case c = truth::make_case(split, options.seed, options.first + k);
+    if (!options.kind.empty() && options.kind != truth::name_of(c.answer.kind)) return;
+    for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
+    const std::scoped_lock lock(printing);
+    fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
+    std::fflush(stdout);
+  });
 
   for (Column& c : columns) std::erase_if(c.outcomes, [](const Outcome& o) { return o.name.empty(); });
   const std::string report = bms::benchmark::report(options.split, options.seed, columns);

@@ -2,11 +2,9 @@
 // and what the term that is learned for it is worth on a hold-out.
 //
 // Exit code: 0 done; 2 bad usage; 3 internal error
-#include <atomic>
 #include <cstdio>
 #include <mutex>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include <fmt/format.h>
@@ -14,6 +12,7 @@
 
 #include "benchmark/law_score.hpp"
 #include "benchmark/run_program.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace {
 
@@ -42,21 +41,15 @@ std::string line_of(std::size_t index, const Outcome& o) {
 void run(const Options& options) {
   const truth::Split split = options.split == "final" ? truth::Split::final : truth::Split::development;
   std::vector<Outcome> outcomes(options.cases);
-  std::atomic<std::size_t> next = 0;
   std::mutex printing;
-  const auto work = [&] {
-    for (std::size_t k = next++; k < options.cases; k = next++) {
-      const truth::Case c = truth::make_outside_case(split, options.seed, options.first + k);
-      if (c.answer.ids.front().find(options.only) == std::string::npos || c.answer.strength < 2) continue;
-      outcomes[k] = bms::benchmark::run_case(c);
-      const std::scoped_lock lock(printing);
-      fmt::print("{}", line_of(options.first + k, outcomes[k]));
-      std::fflush(stdout);
-    }
-  };
-  std::vector<std::thread> threads;
-  for (unsigned k = 0; k < std::max(1U, std::thread::hardware_concurrency()); ++k) threads.emplace_back(work);
-  for (std::thread& t : threads) t.join();
+  bms::measurement::in_parallel(options.cases, [&](std::size_t k) {
+    const truth::Case c = truth::make_outside_case(split, options.seed, options.first + k);
+    if (c.answer.ids.front().find(options.only) == std::string::npos || c.answer.strength < 2) return;
+    outcomes[k] = bms::benchmark::run_case(c);
+    const std::scoped_lock lock(printing);
+    fmt::print("{}", line_of(options.first + k, outcomes[k]));
+    std::fflush(stdout);
+  });
   std::erase_if(outcomes, [](const Outcome& o) { return o.name.empty(); });
   fmt::print("\n{} split, seed {}, {} cases. In brackets: Wilson's 95 % interval.\n\n{}", options.split, options.seed,
              outcomes.size(), bms::benchmark::law_table(outcomes));
