@@ -163,6 +163,8 @@ struct DefaultKnowledge {
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& value) {
     setup.template choose<M>(value);
   }
+  /// Standard deviation of its dependence on the temperature, over its value. 0: it has none, or states none.
+  static double temperature_sigma(const MechanismSetting& /*s*/) { return 0; }
   /// Voltage between the cell's terminals and where its voltage is read, at a check of the instrument.
   template <class S>
   static S between_terminals(const model::MechanismValues<S>& /*value*/, const Check& /*check*/,
@@ -185,6 +187,7 @@ struct MechanismKnowledge {
   bool needs_first_strength;
   double searched_unknowns;
   std::string (*claim)(const MechanismSetting&);
+  double (*temperature_sigma)(const MechanismSetting&);
   std::vector<double> (*probing_shapes)(double);
   std::size_t forms;
   void (*choose_form)(MechanismSetting&, std::size_t, const model::CellParameters<>&);

@@ -26,6 +26,7 @@ constexpr MechanismKnowledge knowledge() {
           .needs_first_strength = K::needs_first_strength,
           .searched_unknowns = K::searched_unknowns,
           .claim = K::claim,
+          .temperature_sigma = K::temperature_sigma,
           .probing_shapes = K::probing_shapes,
           .forms = K::forms,
           .choose_form = K::choose_form,

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "diagnosis/mechanisms/temperature_resistance.hpp"
 #include "diagnosis/thresholds.hpp"
 
 namespace bms::diagnosis {
@@ -21,14 +20,13 @@ std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const
   const bool follows_temperature =
       std::any_of(given.settings.begin(), given.settings.end(),
                   [](const MechanismSetting& s) { return knowledge_of(s.index).follows_temperature; });
-  const MechanismSetting* law = nullptr;
+  double temperature_sigma = 0;
   for (std::size_t k = 0; k < given.own; ++k) {
-    if (given.settings[k].index == model::mechanism_index_of<model::TemperatureResistance>) law = &given.settings[k];
+    const MechanismSetting& own = given.settings[k];
+    temperature_sigma = std::max(temperature_sigma, knowledge_of(own.index).temperature_sigma(own));
   }
   return knowledge.not_testable(
-      {.facts = facts,
-       .follows_temperature = follows_temperature,
-       .temperature_sigma = law == nullptr ? 0 : Knowledge<model::TemperatureResistance>::relative_sigma(*law)});
+      {.facts = facts, .follows_temperature = follows_temperature, .temperature_sigma = temperature_sigma});
 }
 
 std::optional<std::string> no_information(const LikelihoodModel& likelihood) {

@@ -54,9 +54,8 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
                          c.facts.reference_c);
     return std::nullopt;
   }
-  /// Standard deviation of the dependence over its value: of R0's or of R1's, whichever is known better. 0 if the cell
-  /// file states none.
-  static double relative_sigma(const MechanismSetting& s) {
+  /// That of R0 or of R1, whichever is known better.
+  static double temperature_sigma(const MechanismSetting& s) {
     const auto relative = [&](std::size_t p) { return s.value[p] > 0 ? s.deviation[p] / s.value[p] : infinite; };
     return std::min(std::hypot(relative(r0_energy), relative(r0_share)), relative(r1_energy));
   }

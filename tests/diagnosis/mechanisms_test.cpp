@@ -82,9 +82,9 @@ TEST(Mechanisms, ATemperatureSensorNeedsACellFileThatKnowsTheTemperature) {
   using Law = Knowledge<model::TemperatureResistance>;
   MechanismSetting one{
       model::mechanism_index_of<model::TemperatureResistance>, {50e3, 20e3, 25, 0.22}, {10e3, 8e6, 0, 0.09}};
-  EXPECT_NEAR(Law::relative_sigma(one), std::hypot(0.2, 0.09 / 0.22), 1e-9);
+  EXPECT_NEAR(Law::temperature_sigma(one), std::hypot(0.2, 0.09 / 0.22), 1e-9);
   one.deviation[1] = 2e3;
-  EXPECT_NEAR(Law::relative_sigma(one), 0.1, 1e-9);
+  EXPECT_NEAR(Law::temperature_sigma(one), 0.1, 1e-9);
 }
 
 }  // namespace
