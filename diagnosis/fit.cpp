@@ -222,15 +222,18 @@ bool GaussNewton::linearise_again(const Attempt& attempt, int iteration, int& it
 }
 
 HypothesisFit GaussNewton::run(int iterations, double hopeless) {
+  double cost_before = fit_.cost;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     const NormalEquations equations = normal_equations();
     if (equations.within_reach < fit_numerics.within_reach) {
       fit_.converged = true;
       break;
     }
-    if (iteration >= fit_numerics.iterations_before_hopeless &&
+    const bool falls = cost_before - fit_.cost > fit_numerics.falls_share * fit_.cost;
+    if (iteration >= fit_numerics.iterations_before_hopeless && !falls &&
         fit_.cost - fit_numerics.hopeless_times * equations.within_reach > hopeless)
       break;
+    cost_before = fit_.cost;
     const Attempt attempt = attempt_step(equations);
     const bool renewable = attempt.astray && renewals_ < fit_numerics.renewals_astray;
     if (attempt.better && quiet_ == 0 && !renewable) continue;

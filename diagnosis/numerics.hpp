@@ -32,6 +32,7 @@ struct Numerics {
     double calibration_way = 0.02;             ///< the base parameters' step shrinks as 1 / (1 + this damping)
     double within_reach = 0.2;                 ///< possible gain below which a fit has converged
     double hopeless_times = 2;                 ///< of the possible gain that a step is given credit for
+    double falls_share = 0.1;                  ///< of the cost, that an iteration gained: such a fit is not hopeless
     double kept_promise = 0.3;                 ///< share of the promised gain below which a step has gone astray,
     double promise = 2, promise_share = 1e-3;  ///< if it promised more than this and this share of the cost
     double quiet = 0.05, quiet_share = 1e-5;   ///< gain below which an iteration changes nothing
@@ -60,7 +61,7 @@ struct Numerics {
   struct Search {
     int noise_rounds = 2;                 ///< noise and fit in turn
     std::size_t fits_with_own_noise = 3;  ///< of the candidates fitted, those that get their own noise
-    int elimination_rounds = 6;
+    int elimination_rounds = 6, elimination_resumed = 2;
     double onset_reach = 40;     ///< the search for a contact's onset begins at the duration over this
     double onset_rows = 1.5;     ///< and ends at so many rows
     double onset_margin = 0.04;  ///< of the recording at each end, where a step is not a step

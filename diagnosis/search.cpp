@@ -131,10 +131,45 @@ double Search::gain(const HypothesisFit& less, const HypothesisFit& more) {
          known_beforehand(facts, more.hypothesis);
 }
 
-HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, double hopeless) {
+Search::Start Search::cheapest_start(const Hypothesis& h, const HypothesisFit& around, const Foremost& foremost) const {
+  Start best{h, around.calibration};
+  if (foremost.fit == nullptr) return best;
+  const Eigen::VectorXd& u = foremost.fit->calibration;
+  double least = likelihood_.residual(h, around.calibration).squaredNorm() + around.calibration.squaredNorm();
+  const auto try_from = [&](const Hypothesis& start) {
+    Eigen::VectorXd residual = likelihood_.residual(start, u);
+    const double cost = residual.squaredNorm() + u.squaredNorm();
+    if (cost < least) {
+      least = cost;
+      best = {start, u};
+    }
+    return residual;
+  };
+  const Eigen::VectorXd effect = foremost.without - try_from(h), taken_over = foremost.without - foremost.fit->residual;
+  Hypothesis as_large = h;
+  MechanismSetting& s = as_large.settings.back();
+  for (std::size_t p = 0; p < catalogue[s.index].parameters; ++p) {
+    if (catalogue[s.index].parameter[p].role == Role::strength)
+      s.value[p] *= taken_over.dot(effect) / effect.squaredNorm();
+  }
+  if (std::isfinite(s.value[0])) try_from(as_large);
+  return best;
+}
+
+HypothesisFit Search::best_so_far(HypothesisFit f) {
+  std::vector<std::size_t> key = f.hypothesis.added();
+  std::sort(key.begin(), key.end());
+  const auto known = best_.find(key);
+  if (known != best_.end() && score(known->second) <= score(f)) return known->second;
+  return best_[key] = std::move(f);
+}
+
+HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, const Foremost& foremost) {
+  const double hopeless = foremost.cost;
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
-  HypothesisFit best = likelihood_.fit(h, around.calibration, numerics.fit.iterations, hopeless);
+  const Start cheapest = cheapest_start(h, around, foremost);
+  HypothesisFit best = likelihood_.fit(cheapest.hypothesis, cheapest.calibration, numerics.fit.iterations, hopeless);
   for (const MechanismSetting& start : c.other_forms) {
     HypothesisFit other =
         likelihood_.fit(with(around.hypothesis, start), around.calibration, numerics.fit.iterations, hopeless);
@@ -242,10 +277,11 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
       if (!promising && far[k] == 0) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
-    const std::vector<HypothesisFit> here = fitted(from, worth, std::numeric_limits<double>::infinity());
+    const std::vector<HypothesisFit> here = fitted(from, worth, {});
     fits.insert(fits.end(), here.begin(), here.end());
   }
   learn_totals(fits);
+  for (HypothesisFit& f : fits) f = best_so_far(std::move(f));
   std::stable_sort(fits.begin(), fits.end(),
                    [&](const HypothesisFit& a, const HypothesisFit& b) { return score(a) < score(b); });
   return fits;
@@ -268,7 +304,12 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
         all[a].gain >= std::max(candidate_limits.worth_a_fit, candidate_limits.rival_share * r.gain))
       worth.push_back(all[a]);
   }
-  return fitted(from, worth, r.best.cost + search_limits.hopeless);
+  std::vector<HypothesisFit> rivals =
+      fitted(from, worth,
+             {r.best.cost + search_limits.hopeless, &r.best,
+              likelihood_.residual(without(r.best.hypothesis, r.mechanism), r.best.calibration)});
+  for (HypothesisFit& f : rivals) f = best_so_far(std::move(f));
+  return rivals;
 }
 
 std::vector<HypothesisFit> Search::replaced(const HypothesisFit& best, std::size_t mechanism,
@@ -287,7 +328,7 @@ std::vector<HypothesisFit> Search::replaced(const HypothesisFit& best, std::size
 }
 
 std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
-                                          double hopeless) {
+                                          const Foremost& best) {
   std::vector<HypothesisFit> fits(candidates.size());
   // the fits share a linearisation, as several run at once
   if (!around.hypothesis.added().empty())
@@ -295,13 +336,13 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
   else if (!likelihood_.has_linearisation())
     likelihood_.linearise(likelihood_.base(), likelihood_.unchanged());
   measurement::in_parallel(candidates.size(), [&](std::size_t k) {
-    if (!stopped()) fits[k] = fit_with(around, candidates[k], hopeless);
+    if (!stopped()) fits[k] = fit_with(around, candidates[k], best);
   });
   std::erase_if(fits, [](const HypothesisFit& f) { return f.residual.size() == 0; });
   std::stable_sort(fits.begin(), fits.end(),
                    [](const HypothesisFit& a, const HypothesisFit& b) { return a.cost < b.cost; });
   std::size_t foremost = 0;
-  while (foremost < std::min(fits.size(), search_numerics.fits_with_own_noise) && fits[foremost].cost < hopeless)
+  while (foremost < std::min(fits.size(), search_numerics.fits_with_own_noise) && fits[foremost].cost < best.cost)
     ++foremost;
   measurement::in_parallel(foremost, [&](std::size_t k) {
     LikelihoodModel own = likelihood_;
@@ -319,8 +360,10 @@ bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const 
 
 HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism) {
   likelihood_.set_noise(f.noise);
-  return with_own_noise(
-      likelihood_.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations));
+  HypothesisFit rest = best_so_far(with_own_noise(
+      likelihood_.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations)));
+  likelihood_.set_noise(rest.noise);
+  return rest;
 }
 
 void Search::report(std::string_view what) {

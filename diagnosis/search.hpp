@@ -3,6 +3,7 @@
 
 #include <array>
 #include <functional>
+#include <limits>
 #include <map>
 #include <mutex>
 #include <optional>
@@ -71,6 +72,9 @@ class Search {
   /// The rest of a fit without a mechanism, fitted again from where it was.
   HypothesisFit without_one(const HypothesisFit& f, std::size_t mechanism);
 
+  /// The best fit so far of each set of mechanisms.
+  const std::map<std::vector<std::size_t>, HypothesisFit>& best_of_each() const { return best_; }
+
   /// Returns true once the search is to end: no further fit begins.
   bool stopped() const { return stopped_ && stopped_(); }
 
@@ -82,8 +86,23 @@ class Search {
   double total(const HypothesisFit& f) const;
   /// The same of several, on all processors, for score().
   void learn_totals(const std::vector<HypothesisFit>& fits);
+  /// What candidates are compared with.
+  struct Foremost {
+    double cost = std::numeric_limits<double>::infinity();  ///< above it a fit is given up
+    const HypothesisFit* fit = nullptr;
+    Eigen::VectorXd without;  ///< residual of `fit` without the mechanism in whose place the candidates are
+  };
+  /// The better one of this fit and that of the same mechanisms which was the best so far.
+  HypothesisFit best_so_far(HypothesisFit f);
   /// A candidate added to what is there, fitted from its estimate and from far starts. Called from several threads.
-  HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, double hopeless);
+  HypothesisFit fit_with(const HypothesisFit& around, const Candidate& c, const Foremost& foremost);
+  struct Start {
+    Hypothesis hypothesis;
+    Eigen::VectorXd calibration;
+  };
+  /// The cheapest of some starts: the candidate's own, and where it takes over from the mechanism in whose place it is,
+  /// with the base parameters that these two share if they are alike.
+  Start cheapest_start(const Hypothesis& h, const HypothesisFit& around, const Foremost& foremost) const;
   struct FarStart {
     Hypothesis hypothesis;
     double cost;  ///< |residual|^2
@@ -103,13 +122,14 @@ class Search {
   /// The candidates fitted, by cost; the foremost with the noise that they leave, which is smaller if much is
   /// explained.
   std::vector<HypothesisFit> fitted(const HypothesisFit& around, const std::vector<Candidate>& candidates,
-                                    double hopeless);
+                                    const Foremost& foremost);
 
   LikelihoodModel& likelihood_;
   const Progress& progress_;
   const Stopped& stopped_;
   NoiseModel nominal_;
-  std::map<double, double> totals_;  ///< by the fit's cost, which no two different fits share
+  std::map<std::vector<std::size_t>, HypothesisFit> best_;  ///< by mechanisms, in the catalogue's order
+  std::map<double, double> totals_;                         ///< by the fit's cost, which no two different fits share
   std::mutex reporting_;
   int steps_ = 0;
 };

@@ -16,21 +16,25 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
-/// Standard deviation of one estimated parameter over its own, with the parameters of `known` mechanisms fixed: the
-/// resistance of a polarisation and an energy that scales it have a well-known product.
-double share_of_deviation(const HypothesisFit& f, std::size_t parameter, const std::set<std::size_t>& known) {
+/// Covariance of some estimated parameters, with others fixed: the resistance of a polarisation and an energy that
+/// scales it have a well-known product.
+Eigen::MatrixXd covariance_with_fixed(const HypothesisFit& f, const std::vector<Eigen::Index>& of,
+                                      const std::vector<Eigen::Index>& fixed) {
+  const Eigen::MatrixXd own = f.covariance(of, of);
+  if (fixed.empty() || !f.covariance.allFinite()) return own;
+  const Eigen::MatrixXd across = f.covariance(fixed, of);
+  return own - across.transpose() * Eigen::MatrixXd(f.covariance(fixed, fixed)).ldlt().solve(across);
+}
+
+/// Places among the estimated parameters of the mechanisms in `of`, except `mechanism`.
+std::vector<Eigen::Index> places_of(const HypothesisFit& f, const std::set<std::size_t>& of, std::size_t mechanism) {
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
-  const auto index = [&](std::size_t j) { return f.hypothesis.settings[sought[j].setting].index; };
-  std::vector<Eigen::Index> fixed;
+  std::vector<Eigen::Index> places;
   for (std::size_t k = 0; k < sought.size(); ++k) {
-    if (known.contains(index(k)) && index(k) != index(parameter)) fixed.push_back(static_cast<Eigen::Index>(k));
+    const std::size_t index = f.hypothesis.settings[sought[k].setting].index;
+    if (of.contains(index) && index != mechanism) places.push_back(static_cast<Eigen::Index>(k));
   }
-  const auto j = static_cast<Eigen::Index>(parameter);
-  if (fixed.empty() || !f.covariance.allFinite() || !(f.covariance(j, j) > 0)) return 1;
-  const Eigen::MatrixXd of_fixed = f.covariance(fixed, fixed);
-  const Eigen::VectorXd with_fixed = f.covariance(fixed, j);
-  const double follows = with_fixed.dot(of_fixed.ldlt().solve(with_fixed)) / f.covariance(j, j);
-  return std::isfinite(follows) ? std::sqrt(std::clamp(1 - follows, 0.0, 1.0)) : 1;
+  return places;
 }
 
 /// Returns true if a mechanism's own strength does not carry it: each of its strengths, or the first one if the others
@@ -38,6 +42,13 @@ double share_of_deviation(const HypothesisFit& f, std::size_t parameter, const s
 /// deviation was searched, and counts. certain: mechanisms that are there in any case, at whatever size.
 bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain = {}) {
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
+  const std::vector<Eigen::Index> fixed = places_of(f, certain, mechanism);
+  const auto sigma_of = [&](std::size_t j, double sigma) {
+    if (fixed.empty()) return sigma;
+    const auto k = static_cast<Eigen::Index>(j);
+    const double share = covariance_with_fixed(f, {k}, fixed)(0, 0) / f.covariance(k, k);
+    return std::isfinite(share) ? sigma * std::sqrt(std::clamp(share, 0.0, 1.0)) : sigma;
+  };
   bool has_strength = false;
   for (std::size_t j = 0; j < sought.size(); ++j) {
     const MechanismSetting& s = f.hypothesis.settings[sought[j].setting];
@@ -45,8 +56,7 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::
     if (s.index != mechanism || p.role != model::Role::strength) continue;
     if (sought[j].parameter > 0 && knowledge_of(mechanism).needs_first_strength) continue;
     has_strength = true;
-    const double value = s.value[sought[j].parameter],
-                 sigma = s.deviation[sought[j].parameter] * share_of_deviation(f, j, certain);
+    const double value = s.value[sought[j].parameter], sigma = sigma_of(j, s.deviation[sought[j].parameter]);
     const bool known = std::isfinite(sigma) && sigma > 0;
     if (f.at_bound[j] == 0 && (!known || std::abs(value) >= selection_limits.own_sigmas * sigma)) return false;
   }
@@ -63,25 +73,19 @@ double chi_square_of_own_sigmas(Eigen::Index strengths) {
 /// Returns true if all strengths of a mechanism together are within two standard deviations of none, with those of
 /// `certain` mechanisms fixed: of two that share an effect neither is known alone. One at a bound does not count.
 bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain) {
+  const bool weak = is_weak(f, mechanism, certain);
   const std::vector<ParameterRef> sought = f.hypothesis.sought();
-  std::vector<Eigen::Index> own, fixed;
+  std::vector<Eigen::Index> own;
   std::vector<double> value;
   for (std::size_t k = 0; k < sought.size(); ++k) {
     const MechanismSetting& s = f.hypothesis.settings[sought[k].setting];
     const model::Parameter& p = model::catalogue[s.index].parameter[sought[k].parameter];
-    if (s.index != mechanism) {
-      if (certain.contains(s.index)) fixed.push_back(static_cast<Eigen::Index>(k));
-    } else if (p.role == model::Role::strength && f.at_bound[k] == 0) {
-      own.push_back(static_cast<Eigen::Index>(k));
-      value.push_back(s.value[sought[k].parameter]);
-    }
+    if (s.index != mechanism || p.role != model::Role::strength || f.at_bound[k] != 0) continue;
+    own.push_back(static_cast<Eigen::Index>(k));
+    value.push_back(s.value[sought[k].parameter]);
   }
-  if (own.empty() || !is_weak(f, mechanism, certain)) return is_weak(f, mechanism, certain);
-  Eigen::MatrixXd covariance = f.covariance(own, own);
-  if (!fixed.empty()) {
-    const Eigen::MatrixXd across = f.covariance(fixed, own);
-    covariance -= across.transpose() * Eigen::MatrixXd(f.covariance(fixed, fixed)).ldlt().solve(across);
-  }
+  if (own.empty() || !weak) return weak;
+  const Eigen::MatrixXd covariance = covariance_with_fixed(f, own, places_of(f, certain, mechanism));
   const Eigen::Map<const Eigen::VectorXd> strengths(value.data(), static_cast<Eigen::Index>(value.size()));
   const double away = strengths.dot(covariance.ldlt().solve(strengths));
   return !(away >= chi_square_of_own_sigmas(strengths.size()));  // true for NaN
@@ -161,7 +165,7 @@ class Elimination {
       const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
       if (gain < 0 && begins_better(m, without)) return true;
-      const bool credible = is_credible(m);
+      const bool credible = is_credible(found_.best, m);
       if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
         reduced.push_back({scope_.expected.contains(m), gain, without});
       else if (compare_with_rivals(m, without))
@@ -174,10 +178,33 @@ class Elimination {
     return true;
   }
 
-  Survivors survivors() && {
+  /// Returns true if something as simple that was fitted on the way is better by what is needed to be found, and
+  /// credible: what was dropped last had taken its place. That has become the best.
+  bool resume() {
+    const std::size_t most = std::max<std::size_t>(found_.best.hypothesis.added().size(), 1);
+    const HypothesisFit* better = nullptr;
+    for (const auto& [mechanisms, fit] : search_.best_of_each()) {
+      const bool allowed = std::all_of(mechanisms.begin(), mechanisms.end(), [&](std::size_t m) {
+        return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
+               is_credible(fit, m);
+      });
+      const double needed = search_.score(better != nullptr ? *better : found_.best) -
+                            (better != nullptr ? 0 : selection_limits.detected);
+      if (allowed && mechanisms.size() <= most && search_.score(fit) < needed) better = &fit;
+    }
+    if (better == nullptr) return false;
+    found_ = {*better, {}, {}, {}};
+    return true;
+  }
+
+  /// Ends with mechanisms that may stay.
+  void finish() {
     int starts = 0;
     while (drop_one_not_credible() || (starts++ < numerics.search.elimination_rounds && begin_better())) {
     }
+  }
+
+  Survivors survivors() && {
     for (const std::size_t m : found_.best.hypothesis.added()) {
       if (!found_.gains.contains(m)) found_.gains[m] = search_.gain(search_.without_one(found_.best, m), found_.best);
     }
@@ -186,9 +213,8 @@ class Elimination {
 
  private:
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
-  bool is_credible(std::size_t m) const {
-    return scope_.expected.contains(m) ||
-           (!is_weak(found_.best, m, scope_.expected) && !is_implausible(found_.best, m));
+  bool is_credible(const HypothesisFit& f, std::size_t m) const {
+    return scope_.expected.contains(m) || (!is_weak(f, m, scope_.expected) && !is_implausible(f, m));
   }
 
   /// The cell file may contain what is certain in other tables, and has a small error then.
@@ -205,7 +231,7 @@ class Elimination {
     std::size_t worst = no_mechanism;
     for (const std::size_t m : added) {
       const bool too_large = added.size() > 1 && is_too_large(m, rms_v.at(m));
-      if (!too_large && is_credible(m)) continue;
+      if (!too_large && is_credible(found_.best, m)) continue;
       if (worst == no_mechanism || rms_v.at(m) > rms_v.at(worst)) worst = m;
     }
     if (worst == no_mechanism) return false;
@@ -271,7 +297,11 @@ class Elimination {
       const bool same_mechanisms = rival.hypothesis.find(m) != nullptr;
       if (!search_.carries(without, rival)) continue;
       const double ahead = same_mechanisms ? selection_limits.better_start : selection_limits.better_rival;
-      const bool replaceable = same_mechanisms || !scope_.expected.contains(m);
+      const std::vector<std::size_t> added = rival.hypothesis.added();
+      const bool replaceable =
+          same_mechanisms || (!scope_.expected.contains(m) && std::all_of(added.begin(), added.end(), [&](auto other) {
+            return best.hypothesis.find(other) != nullptr || is_credible(rival, other);
+          }));
       if (replaceable && search_.score(rival) < search_.score(best) - ahead) {
         best = rival;
         changed = true;
@@ -337,8 +367,12 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
 Survivors eliminate(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                     const HypothesisFit& grown, const Scope& scope) {
   Elimination elimination(search, likelihood, control, grown, scope);
-  for (int round = 0; round < numerics.search.elimination_rounds && elimination.round(); ++round) {
-  }
+  int resumed = 0;
+  do {
+    for (int round = 0; round < numerics.search.elimination_rounds && elimination.round(); ++round) {
+    }
+    elimination.finish();
+  } while (resumed++ < numerics.search.elimination_resumed && elimination.resume());
   return std::move(elimination).survivors();
 }
 
