@@ -1,0 +1,100 @@
+#include "benchmark/natural_judge.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include <fmt/format.h>
+
+namespace bms::benchmark {
+
+namespace {
+
+/// A limit this much smaller than what is there says that it would have been named.
+constexpr double plainly_above = 2;
+
+bool contains(const std::vector<std::string>& list, const std::string& id) {
+  return std::find(list.begin(), list.end(), id) != list.end();
+}
+
+/// That of the possible causes which is right; nullptr if none is.
+const Possible* right_one(const std::vector<Possible>& cause, const Truth& truth) {
+  const auto found =
+      std::find_if(cause.begin(), cause.end(), [&](const Possible& p) { return contains(truth.ids, p.id); });
+  return found != cause.end() ? &*found : nullptr;
+}
+
+Judgement judge_data_fault(const Answer& answer, const std::vector<Truth>& truths) {
+  for (const std::string& fault : answer.data_faults) {
+    if (std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return contains(t.ids, fault); }))
+      return {Outcome::right, "", ""};
+  }
+  return {Outcome::wrong, "the recording is blamed", ""};
+}
+
+std::string size_text(const Possible& p, const Truth& truth) {
+  if (!p.size.contains(truth.what)) return p.id;
+  const double sigma = p.sigma.contains(truth.what) ? p.sigma.at(truth.what) : 0;
+  return fmt::format("{} {:.4g} +- {:.2g} {}", p.id, p.size.at(truth.what), sigma, truth.unit);
+}
+
+void lower_to(Judgement& j, Outcome outcome, const std::string& why) {
+  if (outcome < j.outcome) j.outcome = outcome;
+  j.why += (j.why.empty() ? "" : "; ") + why;
+}
+
+/// Nothing that is named is this truth.
+void judge_not_named(const Answer& answer, const Truth& truth, Judgement& j) {
+  const bool blames_nothing = answer.verdict == "NO_MISMATCH" || answer.verdict == "NOT_TESTABLE";
+  if (contains(truth.ids, answer.verdict)) return;
+  const auto limit = answer.limits.find(truth.what);
+  const double visible_from = truth.visible ? plainly_above : 1;
+  if (answer.verdict == "NO_MISMATCH" && limit != answer.limits.end() &&
+      std::abs(truth.value) > visible_from * limit->second)
+    return lower_to(j, Outcome::wrong, fmt::format("says that {:.2g} would have shown", limit->second));
+  if (!truth.visible && blames_nothing) return;
+  if (truth.visible || answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, truth.what + " not named");
+}
+
+}  // namespace
+
+const char* name_of(Outcome outcome) {
+  switch (outcome) {
+    case Outcome::wrong:
+      return "WRONG";
+    case Outcome::cannot_tell:
+      return "cannot tell";
+    case Outcome::size_off:
+      return "SIZE OFF";
+    case Outcome::right:
+      return "right";
+  }
+  return "";
+}
+
+Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const std::vector<std::string>& also) {
+  if (answer.verdict == "DATA_FAULT") return judge_data_fault(answer, truths);
+  Judgement j{Outcome::right, "", ""};
+  if (truths.empty() && answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, "nothing is there");
+  for (const std::vector<Possible>& cause : answer.causes) {
+    const bool there = std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return right_one(cause, t); }) ||
+                       std::any_of(cause.begin(), cause.end(), [&](const Possible& p) { return contains(also, p.id); });
+    if (!there) lower_to(j, Outcome::wrong, "names " + cause.front().id);
+  }
+  for (const Truth& truth : truths) {
+    const Possible* named = nullptr;
+    for (const std::vector<Possible>& cause : answer.causes) named = named == nullptr ? right_one(cause, truth) : named;
+    if (named == nullptr) {
+      judge_not_named(answer, truth, j);
+      continue;
+    }
+    j.sizes += (j.sizes.empty() ? "" : ", ") + size_text(*named, truth);
+    if (!(truth.within > 0)) continue;
+    const auto size = named->size.find(truth.what);
+    if (size == named->size.end() || !(std::abs(size->second - truth.value) <= truth.within))
+      lower_to(j, truth.visible ? Outcome::size_off : Outcome::wrong, truth.what + " of another size");
+  }
+  return j;
+}
+
+}  // namespace bms::benchmark
