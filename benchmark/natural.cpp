@@ -226,7 +226,7 @@ void run_all(const Options& o) {
     for (const Given& given : variants(o, c)) {
       Result r = run(o, c, *set, prepared->cell, given);
       for (std::size_t k = first; k < results.size(); ++k)
-        r.worse |= has_fewer(results[k].given, given) && made_worse(results[k].judgement.outcome, r.judgement.outcome);
+        r.worse |= has_fewer(results[k].given, given) && made_worse(results[k].judgement, r.judgement);
       print_line(r);
       results.push_back(std::move(r));
     }

@@ -17,19 +17,17 @@ bool contains(const std::vector<std::string>& list, const std::string& id) {
   return std::find(list.begin(), list.end(), id) != list.end();
 }
 
-/// That of the possible causes which is right; nullptr if none is.
-const Possible* right_one(const std::vector<Possible>& cause, const Truth& truth) {
-  const auto found =
-      std::find_if(cause.begin(), cause.end(), [&](const Possible& p) { return contains(truth.ids, p.id); });
-  return found != cause.end() ? &*found : nullptr;
+/// Returns true if one of those alike is this truth.
+bool includes(const std::vector<Possible>& cause, const Truth& truth) {
+  return std::any_of(cause.begin(), cause.end(), [&](const Possible& p) { return contains(truth.ids, p.id); });
 }
 
 Judgement judge_data_fault(const Answer& answer, const std::vector<Truth>& truths) {
   for (const std::string& fault : answer.data_faults) {
     if (std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return contains(t.ids, fault); }))
-      return {Outcome::right, "", ""};
+      return {.outcome = Outcome::right, .why = "", .sizes = ""};
   }
-  return {Outcome::wrong, "the recording is blamed", ""};
+  return {.outcome = Outcome::wrong, .why = "the recording is blamed", .sizes = ""};
 }
 
 std::string size_text(const Possible& p, const Truth& truth) {
@@ -52,8 +50,23 @@ void judge_not_named(const Answer& answer, const Truth& truth, Judgement& j) {
   if (answer.verdict == "NO_MISMATCH" && limit != answer.limits.end() &&
       std::abs(truth.value) > visible_from * limit->second)
     return lower_to(j, Outcome::wrong, fmt::format("says that {:.2g} would have shown", limit->second));
-  if (!truth.visible && blames_nothing) return;
+  if (!truth.visible && blames_nothing) {
+    j.not_visible = true;
+    return;
+  }
   if (truth.visible || answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, truth.what + " not named");
+}
+
+/// first: what is named of those alike.
+void judge_size(const Possible& first, const Truth& truth, Judgement& j) {
+  j.sizes += (j.sizes.empty() ? "" : ", ") + size_text(first, truth);
+  if (!(truth.within > 0)) return;
+  const auto size = first.size.find(truth.what);
+  if (size == first.size.end()) {
+    lower_to(j, Outcome::cannot_tell, truth.what + " is one of several");
+  } else if (!(std::abs(size->second - truth.value) <= truth.within)) {
+    lower_to(j, truth.visible ? Outcome::size_off : Outcome::wrong, truth.what + " of another size");
+  }
 }
 
 }  // namespace
@@ -74,25 +87,21 @@ const char* name_of(Outcome outcome) {
 
 Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const std::vector<std::string>& also) {
   if (answer.verdict == "DATA_FAULT") return judge_data_fault(answer, truths);
-  Judgement j{Outcome::right, "", ""};
+  Judgement j{.outcome = Outcome::right, .why = "", .sizes = ""};
   if (truths.empty() && answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, "nothing is there");
   for (const std::vector<Possible>& cause : answer.causes) {
-    const bool there = std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return right_one(cause, t); }) ||
+    const bool there = std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return includes(cause, t); }) ||
                        std::any_of(cause.begin(), cause.end(), [&](const Possible& p) { return contains(also, p.id); });
     if (!there) lower_to(j, Outcome::wrong, "names " + cause.front().id);
   }
   for (const Truth& truth : truths) {
-    const Possible* named = nullptr;
-    for (const std::vector<Possible>& cause : answer.causes) named = named == nullptr ? right_one(cause, truth) : named;
-    if (named == nullptr) {
+    const auto named = std::find_if(answer.causes.begin(), answer.causes.end(),
+                                    [&](const std::vector<Possible>& cause) { return includes(cause, truth); });
+    if (named == answer.causes.end()) {
       judge_not_named(answer, truth, j);
       continue;
     }
-    j.sizes += (j.sizes.empty() ? "" : ", ") + size_text(*named, truth);
-    if (!(truth.within > 0)) continue;
-    const auto size = named->size.find(truth.what);
-    if (size == named->size.end() || !(std::abs(size->second - truth.value) <= truth.within))
-      lower_to(j, truth.visible ? Outcome::size_off : Outcome::wrong, truth.what + " of another size");
+    judge_size(named->front(), truth, j);
   }
   return j;
 }

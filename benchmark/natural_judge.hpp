@@ -40,14 +40,17 @@ const char* name_of(Outcome outcome);
 
 struct Judgement {
   Outcome outcome = Outcome::wrong;
-  std::string why;    ///< of an outcome that is not right
-  std::string sizes;  ///< "contact 0.462 +- 0.004 ohm"
+  std::string why;           ///< of an outcome that is not right
+  bool not_visible = false;  ///< right, because what is there cannot be seen without the reference, and is not named
+  std::string sizes;         ///< "contact 0.462 +- 0.004 ohm"
 };
 
 /// also: causes that are there as well and may be named or not.
 Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const std::vector<std::string>& also);
 
 /// Returns true if an answer to more data is worth less than one to fewer.
-inline bool made_worse(Outcome with_fewer, Outcome with_more) { return with_more < with_fewer; }
+inline bool made_worse(const Judgement& with_fewer, const Judgement& with_more) {
+  return with_more.outcome < (with_fewer.not_visible ? Outcome::cannot_tell : with_fewer.outcome);
+}
 
 }  // namespace bms::benchmark

@@ -183,9 +183,11 @@ double at_soc(const Nodes& soc, const Values& value, double at) {
   return value[k - 1] + share * (value[k] - value[k - 1]);
 }
 
-double mean_r0_ohm(const model::CellParameters<>& cell) {
+/// Mean of R0 or R1 over the table.
+template <class Values>
+double mean_ohm(const model::CellParameters<>& cell, const Values& values) {
   double sum = 0;
-  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) sum += cell.rc.r0_ohm[k];
+  for (std::size_t k = 0; k < cell.rc.soc.size; ++k) sum += values[k];
   return sum / static_cast<double>(cell.rc.soc.size);
 }
 
@@ -219,12 +221,19 @@ double mean_temperature_c(const std::vector<PreparedRecording>& records) {
 /// Size of a cause in a truth's unit; nothing if it has none there.
 std::optional<double> size_of(const MechanismSetting& s, const Truth& t, const diagnosis::Diagnosis& d,
                               const std::vector<PreparedRecording>& records) {
-  const std::string_view id = model::catalogue[s.index].id;
-  if (id == "resistance_growth") return s.value[0] * mean_r0_ohm(d.cell);
+  const std::string id(model::catalogue[s.index].id);
+  const bool of_resistance = std::find(t.ids.begin(), t.ids.end(), "resistance_growth") != t.ids.end();
+  if ((id == "resistance_growth" || id == "polarisation_growth") && !of_resistance) return std::nullopt;
+  if ((id == "self_heating" || id == "temperature_resistance") &&
+      std::find(t.ids.begin(), t.ids.end(), id) == t.ids.end())
+    return std::nullopt;
+  if (id == "resistance_growth") return s.value[0] * mean_ohm(d.cell, d.cell.rc.r0_ohm);
+  // in a recording whose rows are farther apart than its time constant it is a resistance
+  if (id == "polarisation_growth") return s.value[0] * mean_ohm(d.cell, d.cell.rc.r1_ohm);
   if (id == "self_heating") return largest_rise_k(s, d, records);
   if (id == "temperature_resistance" && !records.front().temperature_c.empty())
     return s.value[3] * (colder(s.value[0], s.value[2], mean_temperature_c(records)) - 1);
-  const bool as_it_is = t.what != "rise" && t.what != "unlike cells";
+  const bool as_it_is = std::find(t.ids.begin(), t.ids.end(), id) != t.ids.end() && t.what != "unlike cells";
   return as_it_is ? std::optional(s.value[0]) : std::nullopt;
 }
 
@@ -317,7 +326,7 @@ Answer answer_of(const diagnosis::Diagnosis& d, const std::vector<PreparedRecord
     for (const Truth& t : truths) {
       const bool of_truth = std::find(t.ids.begin(), t.ids.end(), id) != t.ids.end() && l.parameter == 0;
       if (!of_truth || id == "self_heating" || id == "temperature_resistance") continue;
-      const double size = id == "resistance_growth" ? l.value * mean_r0_ohm(d.cell) : l.value;
+      const double size = id == "resistance_growth" ? l.value * mean_ohm(d.cell, d.cell.rc.r0_ohm) : l.value;
       const auto known = answer.limits.find(t.what);
       answer.limits[t.what] = known == answer.limits.end() ? size : std::min(known->second, size);
     }

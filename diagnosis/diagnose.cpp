@@ -17,6 +17,7 @@
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
+#include "diagnosis/trusted_readings.hpp"
 #include "diagnosis/withhold.hpp"
 
 namespace bms::diagnosis {
@@ -28,6 +29,7 @@ bool has_data_fault(std::vector<PreparedRecording>& records, Diagnosis& d) {
   for (PreparedRecording& r : records) {
     RecordingCheck check = check_recording(r, d.cell);
     for (DataFault& f : check.faults) d.faults.push_back(std::move(f));
+    if (check.faults.empty() && is_inverted(r)) d.faults.push_back(inverted_current());
     for (const std::string& w : check.warnings) d.warnings.push_back(r.name.empty() ? w : r.name + ": " + w);
   }
   if (d.faults.empty()) return false;
@@ -237,6 +239,11 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   Diagnosis d;
   d.cell = cell;
   if (has_data_fault(records, d)) return d;
+  if (have_trusted_readings(records)) {
+    const std::vector<InstrumentError> errors = compare_instruments(records, cell);
+    return with_instrument_errors(diagnose(cell, own, as_trusted(records, errors), options), errors, cell, own,
+                                  records);
+  }
 
   LikelihoodModel likelihood = likelihood_model_of(cell, own, std::move(records), options.healthy.regimes);
   if (is_uninformative(likelihood, d)) return d;
