@@ -1,5 +1,6 @@
 #include "benchmark/real_cell.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <utility>
 
@@ -15,6 +16,8 @@ namespace bms::benchmark {
 namespace {
 
 using measurement::Recording;
+
+constexpr const char *calibration_part = "semi_real_calibration.csv", *test_part = "semi_real_test.csv";
 
 /// Rows of a recording from `first` on.
 Recording part(const Recording& r, std::size_t first, std::size_t count) {
@@ -59,6 +62,7 @@ std::vector<RealSet> read_sets(files::TomlTable& list) {
     if (t.has("chemistry")) s.chemistry = t.text("chemistry");
     if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
     if (t.has("calibration_current")) s.calibration_current = t.text("calibration_current");
+    if (t.has("calibration_from_s")) s.calibration_from_s = t.number("calibration_from_s");
     if (t.has("cells_in_parallel")) s.cells_in_parallel = t.number("cells_in_parallel");
     if (t.has("test")) s.test = t.text("test");
     t.finish();
@@ -86,20 +90,29 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
       files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
       return (folder / name).string();
     };
-    options.recordings = {save("semi_real_calibration.csv", 0, whole.rows() / 2)};
-    test = save("semi_real_test.csv", whole.rows() / 2, whole.rows());
+    options.recordings = {save(calibration_part, 0, whole.rows() / 2)};
+    test = save(test_part, whole.rows() / 2, whole.rows());
   } else {
     for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
+    if (!set.calibration_current.empty()) {
+      files::ReadOptions reading;
+      reading.map = {"current_a=" + set.calibration_current};
+      const Recording whole =
+          files::read_recording(options.recordings.front(), files::VoltageColumn::required, reading);
+      const auto first = std::lower_bound(whole.time_s.begin(), whole.time_s.end(), set.calibration_from_s);
+      files::write_file((folder / calibration_part).string(),
+                        csv_of(part(whole, static_cast<std::size_t>(first - whole.time_s.begin()), whole.rows())));
+      options.recordings = {(folder / calibration_part).string()};
+    }
   }
   for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
   if (set.healthy.empty()) options.healthy = options.recordings;
   if (!learn_healthy) options.healthy.clear();
   options.name = "calibrated";
-  if (!set.calibration_current.empty()) options.reading.map = {"current_a=" + set.calibration_current};
   p.cell = *workflow::identify_cell(options).cell_file;
   if (set.cells_in_parallel > 1) workflow::scale_to(set.cells_in_parallel * p.cell.parameters.capacity_ah, p.cell);
   p.test = workflow::read_for_diagnosis(test, {}, p.cell);
-  for (const char* name : {"semi_real_calibration.csv", "semi_real_test.csv"}) std::filesystem::remove(folder / name);
+  for (const char* name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
   return p;
 }
 

@@ -15,6 +15,7 @@ namespace bms::benchmark {
 struct RealSet {
   std::string name, cell, start, chemistry, test;
   std::string calibration_current;  ///< column of `calibration` in the place of current_a; empty: none
+  double calibration_from_s = 0;    ///< and only its rows from this time on
   double capacity_ah = 0, cells_in_parallel = 1;
   bool held_out = false;  ///< the rules were not developed on this cell
   bool ocv_from_rests = false, ocv_from_load = false;

@@ -6,6 +6,7 @@
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/one_by_one.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/statistics.hpp"
 
@@ -47,16 +48,6 @@ std::vector<double> voltage_of(const PreparedRecording& r, const std::vector<Ins
     if (!of_cell) v[k] = std::numeric_limits<double>::quiet_NaN();
   }
   return v;
-}
-
-/// What acts in one of the recordings: a contact in the first one from its moment on, in later ones from the start.
-std::vector<MechanismSetting> settings_in(const std::vector<PreparedRecording>& records, std::size_t record,
-                                          std::vector<MechanismSetting> settings) {
-  for (MechanismSetting& s : settings) {
-    if (record > 0 && s.index == model::mechanism_index_of<model::ContactStep>)
-      s.value[contact_onset] = records[record].time_s.front();
-  }
-  return settings;
 }
 
 /// RMS of read less predicted [V]; the predictions become views.
@@ -143,14 +134,8 @@ Diagnosis with_instrument_errors(Diagnosis d, const std::vector<InstrumentError>
   if (errors.empty() || d.verdict == Verdict::data_fault) return d;
   if (d.verdict == Verdict::unknown)
     d.warnings.emplace_back("what the trusted instruments read of the cell is not explained by its file");
-  const std::vector<NotTestable> not_testable = d.not_testable;
   extend(d, errors, cell, own);
-  d.views.clear();
-  for (const PreparedRecording& r : records) {
-    RecordingView& view = d.views.emplace_back();
-    view.base_v = predict(cell, own, r);
-    view.extended_v = predict(d.cell, settings_in(records, d.views.size() - 1, d.extended.settings), r, &view.soc);
-  }
+  set_views(d, cell, own, records);
   std::vector<Finding> of_instruments;
   for (const InstrumentError& e : errors) {
     Finding& f = of_instruments.emplace_back();
