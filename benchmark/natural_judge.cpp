@@ -95,8 +95,11 @@ Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const st
     if (!there) lower_to(j, Outcome::wrong, "names " + cause.front().id);
   }
   for (const Truth& truth : truths) {
-    const auto named = std::find_if(answer.causes.begin(), answer.causes.end(),
-                                    [&](const std::vector<Possible>& cause) { return includes(cause, truth); });
+    const auto named =
+        std::find_if(answer.causes.begin(), answer.causes.end(), [&](const std::vector<Possible>& cause) {
+          // one of several alike does not say that it is seen
+          return truth.visible ? includes(cause, truth) : contains(truth.ids, cause.front().id);
+        });
     if (named == answer.causes.end()) {
       judge_not_named(answer, truth, j);
       continue;

@@ -303,12 +303,10 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   const bool one = records.size() == 1 || options.learns || !options.healthy.known;
   Diagnosis together = diagnose_together(std::move(d), own, one ? std::move(records) : records, options);
   if (one || names(together.verdict) || together.interrupted) return together;
-  Options of_one = options;
-  of_one.false_alarm_rate /= static_cast<double>(records.size());
   return likeliest_alone(std::move(together), cell, own, records, [&](const PreparedRecording& r) {
     Diagnosis alone;
     alone.cell = cell;
-    return diagnose_together(std::move(alone), own, {r}, of_one);
+    return diagnose_together(std::move(alone), own, {r}, options);
   });
 }
 

@@ -21,7 +21,7 @@ void set_views(Diagnosis& d, const model::CellParameters<>& cell, const std::vec
                const std::vector<PreparedRecording>& records);
 
 /// The answer of the recording that names a cause with the largest gain; `together`, which names none, if none does.
-/// diagnose_one: asked with a false alarm rate that the recordings share.
+/// The false alarm rate is that of one recording, as always.
 Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cell,
                           const std::vector<MechanismSetting>& own, const std::vector<PreparedRecording>& records,
                           const std::function<Diagnosis(const PreparedRecording&)>& diagnose_one);

@@ -82,15 +82,11 @@ void average_references(PreparedRecording& r, std::span<const double> current_re
     const auto readings = std::count_if(reference.begin(), reference.end(), [](double x) { return std::isfinite(x); });
     return static_cast<double>(readings) > reference_limits.covers * static_cast<double>(r.size());
   };
-  if (covers(current_ref_a))
-    r.current_ref_a = std::vector<double>(current_ref_a.begin(), current_ref_a.end());
-  else
-    add_checks(r, {Check::Channel::current, r.current_a, current_ref_a, reference_limits.still_c * cell.capacity_ah},
-               cell);
-  if (covers(voltage_ref_v))
-    r.voltage_ref_v = std::vector<double>(voltage_ref_v.begin(), voltage_ref_v.end());
-  else
-    add_checks(r, {Check::Channel::voltage, r.voltage_v, voltage_ref_v, reference_limits.still_v}, cell);
+  if (covers(current_ref_a)) r.current_ref_a = std::vector<double>(current_ref_a.begin(), current_ref_a.end());
+  if (covers(voltage_ref_v)) r.voltage_ref_v = std::vector<double>(voltage_ref_v.begin(), voltage_ref_v.end());
+  add_checks(r, {Check::Channel::current, r.current_a, current_ref_a, reference_limits.still_c * cell.capacity_ah},
+             cell);
+  add_checks(r, {Check::Channel::voltage, r.voltage_v, voltage_ref_v, reference_limits.still_v}, cell);
   if (current_ref_a.empty() || voltage_ref_v.empty()) return;
   for (std::size_t k = 0; k < r.size(); ++k) {
     if (current_ref_a[k] == 0 && std::isfinite(voltage_ref_v[k]))

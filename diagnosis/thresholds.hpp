@@ -332,7 +332,7 @@ struct Thresholds {
     double spread_counts = 1;         ///< as if so many more blocks had shown log_spread. With 1 false alarms keep
                                       ///< their rate up to a spread of 1.5; pooled over 17 sets of NASA B0005, B0007
                                       ///< and B0025 it is 0.48
-    double blocks_at_least = 3;       ///< for a Student distribution
+    double blocks_at_least = 2;       ///< for a Student distribution
     double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
     double temperature_beyond_k = 5;  ///< [K]
     double current_beyond = 1.25;     ///< times their largest current

@@ -122,6 +122,7 @@ std::vector<PreparedRecording> as_trusted(const std::vector<PreparedRecording>& 
     if (has_trusted(r, Channel::current)) r.current_a = current_a;
     r.trusted_current = has_trusted(r, Channel::current);
     r.trusted_voltage = has_trusted(r, Channel::voltage);
+    std::erase_if(r.checks, [&](const Check& c) { return has_trusted(r, c.channel); });
     r.current_ref_a = {};
     r.voltage_ref_v = {};
   }
