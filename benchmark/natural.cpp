@@ -162,7 +162,7 @@ void print_line(const Result& r) {
 /// Right ones, and what else, of one kind of truth and one half of the cells.
 void print_counts(const std::vector<Result>& results) {
   fmt::print(
-      "\n| truth | cells | cases | diagnoses | right | size off | cannot tell | wrong | worse with more data |\n"
+      "\n| truth | cells | cases | diagnoses | right | size off | undecided | wrong | worse with more data |\n"
       "|---|---|---|---|---|---|---|---|---|\n");
   std::map<std::pair<std::string, bool>, std::vector<const Result*>> groups;
   for (const Result& r : results) {
@@ -178,7 +178,7 @@ void print_counts(const std::vector<Result>& results) {
       cases += has_fewer(r->given, {}) ? 1 : 0;
     }
     fmt::print("| {} | {} | {} | {} | {} | {} | {} | {} | {} |\n", key.first, key.second ? "set aside" : "development",
-               cases, group.size(), count[Outcome::right], count[Outcome::size_off], count[Outcome::cannot_tell],
+               cases, group.size(), count[Outcome::right], count[Outcome::size_off], count[Outcome::undecided],
                count[Outcome::wrong], worse);
   }
 }

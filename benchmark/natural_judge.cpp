@@ -54,7 +54,7 @@ void judge_not_named(const Answer& answer, const Truth& truth, Judgement& j) {
     j.not_visible = true;
     return;
   }
-  if (truth.visible || answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, truth.what + " not named");
+  if (truth.visible || answer.verdict == "UNKNOWN") lower_to(j, Outcome::undecided, truth.what + " not named");
 }
 
 /// first: what is named of those alike.
@@ -63,7 +63,7 @@ void judge_size(const Possible& first, const Truth& truth, Judgement& j) {
   if (!(truth.within > 0)) return;
   const auto size = first.size.find(truth.what);
   if (size == first.size.end()) {
-    lower_to(j, Outcome::cannot_tell, truth.what + " is one of several");
+    lower_to(j, Outcome::undecided, truth.what + " is one of several");
   } else if (!(std::abs(size->second - truth.value) <= truth.within)) {
     lower_to(j, truth.visible ? Outcome::size_off : Outcome::wrong, truth.what + " of another size");
   }
@@ -75,8 +75,8 @@ const char* name_of(Outcome outcome) {
   switch (outcome) {
     case Outcome::wrong:
       return "WRONG";
-    case Outcome::cannot_tell:
-      return "cannot tell";
+    case Outcome::undecided:
+      return "undecided";
     case Outcome::size_off:
       return "SIZE OFF";
     case Outcome::right:
@@ -88,7 +88,7 @@ const char* name_of(Outcome outcome) {
 Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const std::vector<std::string>& also) {
   if (answer.verdict == "DATA_FAULT") return judge_data_fault(answer, truths);
   Judgement j{.outcome = Outcome::right, .why = "", .sizes = ""};
-  if (truths.empty() && answer.verdict == "UNKNOWN") lower_to(j, Outcome::cannot_tell, "nothing is there");
+  if (truths.empty() && answer.verdict == "UNKNOWN") lower_to(j, Outcome::undecided, "nothing is there");
   for (const std::vector<Possible>& cause : answer.causes) {
     const bool there = std::any_of(truths.begin(), truths.end(), [&](const Truth& t) { return includes(cause, t); }) ||
                        std::any_of(cause.begin(), cause.end(), [&](const Possible& p) { return contains(also, p.id); });

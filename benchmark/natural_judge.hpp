@@ -19,7 +19,7 @@ struct Truth {
   std::string how;      ///< how the value was measured
 };
 
-/// A cause that is named, or another one that the recordings cannot tell from it.
+/// A cause that is named, or another one that the recordings cannot distinguish from it.
 struct Possible {
   std::string id;
   std::map<std::string, double> size;   ///< by Truth::what
@@ -35,7 +35,7 @@ struct Answer {
 };
 
 /// In ascending order of worth.
-enum class Outcome { wrong, cannot_tell, size_off, right };
+enum class Outcome { wrong, undecided, size_off, right };
 const char* name_of(Outcome outcome);
 
 struct Judgement {
@@ -50,7 +50,7 @@ Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const st
 
 /// Returns true if an answer to more data is worth less than one to fewer.
 inline bool made_worse(const Judgement& with_fewer, const Judgement& with_more) {
-  return with_more.outcome < (with_fewer.not_visible ? Outcome::cannot_tell : with_fewer.outcome);
+  return with_more.outcome < (with_fewer.not_visible ? Outcome::undecided : with_fewer.outcome);
 }
 
 }  // namespace bms::benchmark

@@ -298,7 +298,7 @@ std::vector<Truth> truths_of(const NaturalCase& c, const Recording& whole, const
     else if (what == "unlike_cells")
       truths.push_back(unlike_cells_of(whole));
     else if (what != "sign" && what != "nothing")
-      throw files::BadInput(c.name, 1, "'" + what + "' is no known truth");
+      throw files::BadInput(c.name, 1, "'" + what + "' is not a truth, expected one of the list's");
   }
   const bool sign = std::find(c.truths.begin(), c.truths.end(), "sign") != c.truths.end();
   if (sign && is_inverted(whole)) return {{"sign", {"current_inverted"}, "", -1, 0, true, "both ammeters"}};

@@ -22,7 +22,7 @@ constexpr const Thresholds::References& compare_limits = thresholds.references;
 struct Effect {
   std::size_t mechanism;
   Eigen::VectorXd by_row;
-  double tolerance = 0;  ///< of the strength: a smaller one is no error
+  double tolerance = 0;  ///< of the strength: a smaller one does not count
 };
 
 /// The difference of an instrument from the trusted one, all recordings one after the other.
@@ -176,7 +176,7 @@ struct Both {
   std::vector<Eigen::Index> block_ends;
 
   void add(const PreparedRecording& r, const measurement::Column& read, const measurement::Column& reference) {
-    const std::size_t before = error.size(), blocks = compare_limits.blocks;
+    const std::size_t before = error.size(), blocks = numerics.statistics.blocks;
     for (std::size_t block = 0; block < blocks; ++block) {
       for (std::size_t k = block * r.size() / blocks; k < (block + 1) * r.size() / blocks; ++k) {
         const double a = r.current_ref_a.empty() ? r.current_a[k] : r.current_ref_a[k];

@@ -27,7 +27,7 @@ struct InstrumentError {
 /// Returns true if the trusted instrument of this kind read in nearly all rows.
 bool has_trusted(const PreparedRecording& record, Check::Channel channel);
 
-/// Errors of both instruments, the larger gain first. What is within the tolerance of the cell file is none.
+/// Errors of both instruments, the larger gain first. What is within the tolerance of the cell file does not count.
 std::vector<InstrumentError> compare_instruments(const std::vector<PreparedRecording>& records,
                                                  const model::CellParameters<>& cell);
 

@@ -287,15 +287,12 @@ struct Thresholds {
 
   /// Readings of trusted instruments.
   struct References {
-    double covers = 0.9;           ///< share of the rows with a reading, above which a trusted instrument takes
-                                   ///< the place of the own one
-    std::size_t blocks = 24;       ///< of a recording, whose differences count as independent of each other
+    double covers = 0.9;           ///< share of the rows from which a trusted instrument takes the place of the own
     double check_at_most_s = 300;  ///< [s] readings averaged to one check
     double filter_share = 0.1;     ///< of a stretch at its start, where a filtered channel may still move
     double still_v = 0.02, still_c = 0.02;  ///< [V], [C] by which a reference moves within a check
     double unsteady_share = 0.05;           ///< of an instrument's error that differs from time to time
-    double meter_v = 3e-4;                  ///< [V] standard deviation of a trusted voltmeter
-    double meter_c = 3e-5;                  ///< [C] of a trusted ammeter
+    double meter_v = 3e-4, meter_c = 3e-5;  ///< [V], [C] standard deviation of a trusted voltmeter and ammeter
   };
 
   /// What the current sensor reads in rests after a discharge (idle_reading.hpp).

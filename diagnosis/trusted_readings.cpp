@@ -22,7 +22,7 @@ double strength(const std::vector<InstrumentError>& errors, std::size_t mechanis
   return found != errors.end() ? found->setting.value[0] : 0;
 }
 
-/// The trusted readings; where there is none, the own one without its error.
+/// The trusted readings; elsewhere the own one without its error.
 std::vector<double> current_of(const PreparedRecording& r, const std::vector<InstrumentError>& errors) {
   const double offset_a = strength(errors, model::mechanism_index_of<model::CurrentOffset>),
                gain = strength(errors, model::mechanism_index_of<model::CurrentGain>);

@@ -30,7 +30,7 @@ TEST(NaturalJudge, OfSeveralAlikeTheSizeIsThatOfTheOneThatIsNamed) {
       "AMBIGUOUS", {{cause("polarisation_growth", "contact", 0.46), {"resistance_growth", {}, {}}}}, {}, {}};
   EXPECT_EQ(outcome(with_size, {contact}), Outcome::right);
   const Answer without{"AMBIGUOUS", {{{"slow_polarisation", {}, {}}, {"resistance_growth", {}, {}}}}, {}, {}};
-  EXPECT_EQ(outcome(without, {contact}), Outcome::cannot_tell);
+  EXPECT_EQ(outcome(without, {contact}), Outcome::undecided);
 }
 
 TEST(NaturalJudge, ToSayNothingIsRightOnlyWhereNothingCanBeSeen) {
@@ -39,9 +39,9 @@ TEST(NaturalJudge, ToSayNothingIsRightOnlyWhereNothingCanBeSeen) {
       << "it says that 0.5 % would have shown";
   EXPECT_EQ(outcome({"CAUSE", {{cause("current_gain", "current_gain", -0.03)}}, {}, {}}, {hidden_gain}),
             Outcome::wrong);
-  EXPECT_EQ(outcome({"NO_MISMATCH", {}, {}, {}}, {contact}), Outcome::cannot_tell);
+  EXPECT_EQ(outcome({"NO_MISMATCH", {}, {}, {}}, {contact}), Outcome::undecided);
   EXPECT_EQ(outcome({"NO_MISMATCH", {}, {}, {{"contact", 0.01}}}, {contact}), Outcome::wrong);
-  EXPECT_EQ(outcome({"UNKNOWN", {}, {}, {}}, {}), Outcome::cannot_tell) << "nothing is there";
+  EXPECT_EQ(outcome({"UNKNOWN", {}, {}, {}}, {}), Outcome::undecided) << "nothing is there";
 }
 
 TEST(NaturalJudge, AFaultOfTheDataIsRightOnlyIfItIsThere) {

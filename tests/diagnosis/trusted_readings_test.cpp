@@ -45,7 +45,7 @@ TEST(TrustedReadings, AGainThatTheCellCannotShowIsReadOff) {
   EXPECT_EQ(diagnose(test::table9(), {}, {r}).verdict, Verdict::no_mismatch) << "without the ammeter it is not visible";
 }
 
-TEST(TrustedReadings, AContactAndAnOffsetAreToldApart) {
+TEST(TrustedReadings, AContactAndAnOffsetAreDistinguished) {
   PreparedRecording r = with_references(healthy());
   for (std::size_t k = 0; k < r.size(); ++k) r.voltage_v.edit()[k] += 0.012 * r.current_a[k] + 0.015;
   const Diagnosis d = diagnose(test::table9(), {}, {r});
