@@ -143,7 +143,7 @@ TEST(OneByOne, WhatOneRecordingShowsIsNotLost) {
     return d;
   };
   const Diagnosis d = likeliest_alone(together, test::table9(), {}, records, one);
-  EXPECT_EQ(d.verdict, Verdict::cause);
+  ASSERT_EQ(d.verdict, Verdict::cause);
   EXPECT_EQ(d.extended.settings.front().value[0], 0.05) << "of the recording with the larger gain";
   ASSERT_EQ(d.views.size(), 3U);
   EXPECT_EQ(d.views[0].extended_v, d.views[0].base_v) << "the contact is later than the first recording";
