@@ -6,8 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
-#include <exception>
-#include <filesystem>
 #include <limits>
 #include <map>
 #include <optional>
@@ -19,21 +17,22 @@
 #include <CLI/CLI.hpp>
 
 #include "benchmark/injected_faults.hpp"
+#include "benchmark/real_cell.hpp"
 #include "benchmark/run_program.hpp"
 #include "benchmark/semi_real_tables.hpp"
 #include "diagnosis/predicted_band.hpp"
 #include "diagnosis/prepare.hpp"
-#include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
 #include "measurement/statistics.hpp"
 #include "workflow/diagnose_recordings.hpp"
-#include "workflow/identify_cell.hpp"
 
 namespace {
 
 using bms::benchmark::injected_faults;
 using bms::benchmark::InjectedFault;
+using bms::benchmark::Prepared;
+using bms::benchmark::RealSet;
 using Result = bms::benchmark::SemiRealResult;
 using bms::diagnosis::Finding;
 using bms::measurement::Recording;
@@ -45,104 +44,6 @@ struct Options {
   double false_alarm_rate = 0.01;
   bool nulls_only = false, without_healthy = false, bands_only = false;
 };
-
-struct RealSet {
-  std::string name, cell, start, chemistry, test;
-  double capacity_ah = 0;
-  bool held_out = false;  ///< the rules were not developed on this cell
-  bool ocv_from_rests = false, ocv_from_load = false;
-  std::optional<double> initial_soc;
-  std::vector<std::string> calibration, healthy, ocv;
-};
-
-std::vector<RealSet> read_sets(const Options& o) {
-  std::vector<RealSet> sets;
-  bms::files::TomlTable top = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
-  for (bms::files::TomlTable& t : top.tables("set")) {
-    RealSet s;
-    s.name = t.text("name");
-    s.cell = t.text("cell");
-    s.start = t.text("start");
-    s.calibration = t.texts("calibration");
-    s.held_out = t.flag("held_out");
-    if (t.has("healthy")) s.healthy = t.texts("healthy");
-    if (t.has("ocv")) s.ocv = t.texts("ocv");
-    if (t.has("ocv_from_rests")) s.ocv_from_rests = t.flag("ocv_from_rests");
-    if (t.has("ocv_from_load")) s.ocv_from_load = t.flag("ocv_from_load");
-    if (t.has("initial_soc")) s.initial_soc = t.number("initial_soc");
-    if (t.has("chemistry")) s.chemistry = t.text("chemistry");
-    if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
-    if (t.has("test")) s.test = t.text("test");
-    t.finish();
-    if (s.name.find(o.only) != std::string::npos) sets.push_back(std::move(s));
-  }
-  top.finish();
-  return sets;
-}
-
-/// Rows of a recording from `first` on.
-Recording part(const Recording& r, std::size_t first, std::size_t count) {
-  Recording p = r;
-  for (auto column : {&Recording::time_s, &Recording::current_a, &Recording::voltage_v, &Recording::temperature_c,
-                      &Recording::soc_ref, &Recording::current_ref_a, &Recording::voltage_ref_v}) {
-    if (!(r.*column).empty()) p.*column = (r.*column).part(first, count);
-  }
-  return p;
-}
-
-std::string csv_of(const Recording& r) {
-  std::string text = "time_s,current_a,voltage_v";
-  if (!r.temperature_c.empty()) text += ",temperature_c";
-  if (!r.soc_ref.empty()) text += ",soc_ref";
-  text += "\n";
-  for (std::size_t k = 0; k < r.rows(); ++k) {
-    text += fmt::format("{},{},{}", r.time_s[k], r.current_a[k], r.voltage_v[k]);
-    if (!r.temperature_c.empty()) text += fmt::format(",{}", r.temperature_c[k]);
-    if (!r.soc_ref.empty()) text += fmt::format(",{}", r.soc_ref[k]);
-    text += "\n";
-  }
-  return text;
-}
-
-struct Prepared {
-  bms::files::CellFile cell;
-  Recording test;
-};
-
-/// The identified cell and the recording that is left out.
-Prepared prepare(const Options& o, const RealSet& set) {
-  const auto path = [&](const std::string& name) { return (std::filesystem::path(o.data) / name).string(); };
-  bms::workflow::IdentifyOptions options;
-  options.start = set.start;
-  for (const std::string& slow : set.ocv) options.ocv.push_back(path(slow));
-  options.chemistry = set.chemistry;
-  options.capacity_ah = set.capacity_ah;
-  options.ocv_from_rests = set.ocv_from_rests;
-  options.ocv_from_load = set.ocv_from_load;
-  if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
-  Prepared p;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path();
-  std::string test = path(set.test);
-  if (set.test.empty()) {
-    const Recording whole = bms::files::read_recording(path(set.calibration.front()));
-    const auto save = [&](const char* name, std::size_t first, std::size_t end) {
-      bms::files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
-      return (folder / name).string();
-    };
-    options.recordings = {save("semi_real_calibration.csv", 0, whole.rows() / 2)};
-    test = save("semi_real_test.csv", whole.rows() / 2, whole.rows());
-  } else {
-    for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
-  }
-  for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
-  if (set.healthy.empty()) options.healthy = options.recordings;
-  if (o.without_healthy) options.healthy.clear();
-  options.name = "calibrated";
-  p.cell = *bms::workflow::identify_cell(options).cell_file;
-  p.test = bms::workflow::read_for_diagnosis(test, {}, p.cell);
-  for (const char* name : {"semi_real_calibration.csv", "semi_real_test.csv"}) std::filesystem::remove(folder / name);
-  return p;
-}
 
 /// The band of the prediction on the recording that is left out.
 struct Band {
@@ -273,10 +174,14 @@ void run(const Options& o) {
   };
   if (o.bands_only)
     fmt::print("| cell | set | within the 95 % band | error, RMS | band, RMS |\n|---|---|---|---|---|\n");
-  for (const RealSet& set : read_sets(o)) {
+  bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
+  const std::vector<RealSet> sets = bms::benchmark::read_sets(list);
+  list.finish();
+  for (const RealSet& set : sets) {
+    if (set.name.find(o.only) == std::string::npos) continue;
     Prepared p;
     try {
-      p = prepare(o, set);
+      p = prepare(o.data, set, !o.without_healthy);
     } catch (const std::runtime_error& error) {  // no cell file, no case
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
       continue;

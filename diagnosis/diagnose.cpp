@@ -11,12 +11,14 @@
 #include "diagnosis/effect_gain.hpp"
 #include "diagnosis/findings.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/one_by_one.hpp"
 #include "diagnosis/one_current.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/profile.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
+#include "diagnosis/trusted_readings.hpp"
 #include "diagnosis/withhold.hpp"
 
 namespace bms::diagnosis {
@@ -28,6 +30,7 @@ bool has_data_fault(std::vector<PreparedRecording>& records, Diagnosis& d) {
   for (PreparedRecording& r : records) {
     RecordingCheck check = check_recording(r, d.cell);
     for (DataFault& f : check.faults) d.faults.push_back(std::move(f));
+    if (check.faults.empty() && is_inverted(r)) d.faults.push_back(inverted_current());
     for (const std::string& w : check.warnings) d.warnings.push_back(r.name.empty() ? w : r.name + ": " + w);
   }
   if (d.faults.empty()) return false;
@@ -188,6 +191,60 @@ void add_extended_cell(const LikelihoodModel& likelihood, const HypothesisFit& b
         d.cell, {best.calibration.data(), best.calibration.data() + best.calibration.size()});
 }
 
+/// The diagnosis of recordings that can be used. d: with the cell, and what the checks have found.
+Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& own,
+                            std::vector<PreparedRecording> records, const Options& options) {
+  LikelihoodModel likelihood = likelihood_model_of(d.cell, own, std::move(records), options.healthy.regimes);
+  if (is_uninformative(likelihood, d)) return d;
+  const Scope scope = scope_of(likelihood);
+  d.not_testable = scope.not_testable;
+
+  Search search(likelihood, options.progress, options.stopped);
+  const HypothesisFit control = search.with_own_noise(likelihood.fit(likelihood.base()));
+  search.report("calibration");
+  const Grown grown = grow(search, control, scope, options.most_mechanisms);
+  const std::vector<StrengthSigma> sigmas = strength_sigmas(likelihood, search.nominal_noise(), control, scope);
+  search.report("noise");
+  Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
+  d.gains = gains_of(grown, survivors);
+  std::optional<HealthyJudge> judge_healthy;
+  if (options.healthy.known) {
+    judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
+    survivors = judge_healthy->without_withheld(std::move(survivors));
+  }
+  if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
+  Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
+  d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
+  d.unknown_gain = unknown_gain(adequacy.residual);
+  if (options.learns && adequacy.found)
+    d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));
+  if (judge_healthy) {
+    judge_healthy->withhold_unknown(adequacy);
+    d.healthy = judge_healthy->basis();
+    d.withheld = judge_healthy->withheld();
+  }
+  if (!options.learns) survivors.best = profiled(likelihood, std::move(survivors.best));
+  include_model_error(likelihood, survivors.best);
+
+  const Contributions contributed = contributions(likelihood, control, survivors.best);
+  const auto healthy_gain = [&](std::size_t m) { return judge_healthy->gain_needed(m); };
+  d.findings = findings_of(search, survivors, contributed, judge_healthy ? HealthyGain(healthy_gain) : HealthyGain());
+  add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
+  const Errors errors = errors_of(search, likelihood, options.healthy);
+  d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
+  d.verdict = verdict_of(adequacy, d, contributed, errors);
+  d.interrupted = search.stopped();
+  // that nothing was found yet does not mean that nothing is there
+  if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
+  add_numbers(adequacy, search.nominal_noise(), d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
+  add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
+  add_extended_cell(likelihood, survivors.best, d);
+  d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
+  if (options.progress) options.progress(1, "done");
+  return d;
+}
+
 }  // namespace
 
 const char* name_of(Verdict verdict) {
@@ -237,56 +294,20 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   Diagnosis d;
   d.cell = cell;
   if (has_data_fault(records, d)) return d;
-
-  LikelihoodModel likelihood = likelihood_model_of(cell, own, std::move(records), options.healthy.regimes);
-  if (is_uninformative(likelihood, d)) return d;
-  const Scope scope = scope_of(likelihood);
-  d.not_testable = scope.not_testable;
-
-  Search search(likelihood, options.progress, options.stopped);
-  const HypothesisFit control = search.with_own_noise(likelihood.fit(likelihood.base()));
-  search.report("calibration");
-  const Grown grown = grow(search, control, scope, options.most_mechanisms);
-  const std::vector<StrengthSigma> sigmas = strength_sigmas(likelihood, search.nominal_noise(), control, scope);
-  search.report("noise");
-  Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
-  d.gains = gains_of(grown, survivors);
-  std::optional<HealthyJudge> judge_healthy;
-  if (options.healthy.known) {
-    judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
-    survivors = judge_healthy->without_withheld(std::move(survivors));
+  if (have_trusted_readings(records)) {
+    const std::vector<InstrumentError> errors = compare_instruments(records, cell);
+    return with_instrument_errors(diagnose(cell, own, as_trusted(records, errors), options), errors, cell, own,
+                                  records);
   }
-  if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
-  Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
-  d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
-  d.unknown_gain = unknown_gain(adequacy.residual);
-  if (options.learns && adequacy.found)
-    d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));
-  if (judge_healthy) {
-    judge_healthy->withhold_unknown(adequacy);
-    d.healthy = judge_healthy->basis();
-    d.withheld = judge_healthy->withheld();
-  }
-  if (!options.learns) survivors.best = profiled(likelihood, std::move(survivors.best));
-  include_model_error(likelihood, survivors.best);
-
-  const Contributions contributed = contributions(likelihood, control, survivors.best);
-  const auto healthy_gain = [&](std::size_t m) { return judge_healthy->gain_needed(m); };
-  d.findings = findings_of(search, survivors, contributed, judge_healthy ? HealthyGain(healthy_gain) : HealthyGain());
-  add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
-  const Errors errors = errors_of(search, likelihood, options.healthy);
-  d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
-  d.verdict = verdict_of(adequacy, d, contributed, errors);
-  d.interrupted = search.stopped();
-  // that nothing was found yet does not mean that nothing is there
-  if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
-  add_numbers(adequacy, search.nominal_noise(), d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
-  add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
-  add_extended_cell(likelihood, survivors.best, d);
-  d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
-  if (options.progress) options.progress(1, "done");
-  return d;
+  // what one recording names has a known false alarm rate only next to healthy ones
+  const bool one = records.size() == 1 || options.learns || !options.healthy.known;
+  Diagnosis together = diagnose_together(std::move(d), own, one ? std::move(records) : records, options);
+  if (one || names(together.verdict) || together.interrupted) return together;
+  return likeliest_alone(std::move(together), cell, own, records, [&](const PreparedRecording& r) {
+    Diagnosis alone;
+    alone.cell = cell;
+    return diagnose_together(std::move(alone), own, {r}, options);
+  });
 }
 
 }  // namespace bms::diagnosis

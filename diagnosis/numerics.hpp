@@ -16,6 +16,7 @@ struct Statistics {
   double uniform_variance_denominator = 12;  ///< a rounding error has variance step^2 / 12
   double chi_square_median = 0.4549;         ///< of one degree of freedom
   double wilson_hilferty = 2.0 / 9;          ///< their factor
+  std::size_t blocks = 24;                   ///< of a recording, whose errors are independent of each other
   double normal_of_two_sigma = 1.690;        ///< one-sided quantile at the probability of two sigma on both sides
 };
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/statistics.hpp"
 
@@ -103,7 +104,9 @@ void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood,
       continue;
     std::vector<std::size_t> alike;
     for (const std::size_t m : alike_at_one_current) {
-      if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr) alike.push_back(m);
+      if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr &&
+          !reads_trusted(likelihood.facts(), m))
+        alike.push_back(m);
     }
     f.probability /= static_cast<double>(1 + alike.size());  // none is more probable than another
     for (HypothesisFit& fit : search.replaced(best, f.setting.index, alike)) {

@@ -29,9 +29,12 @@ struct Check {
 struct PreparedRecording {
   std::string name;
   measurement::Column time_s;
-  measurement::Column current_a;      ///< NaN: no reading
-  measurement::Column voltage_v;      ///< NaN: no reading, or one that must not be used
-  measurement::Column temperature_c;  ///< empty: not recorded
+  measurement::Column current_a;           ///< NaN: no reading
+  measurement::Column voltage_v;           ///< NaN: no reading, or one that must not be used
+  measurement::Column temperature_c;       ///< empty: not recorded
+  measurement::Column current_ref_a = {};  ///< of a trusted ammeter that read in nearly all rows; else empty
+  measurement::Column voltage_ref_v = {};  ///< the same of a voltmeter
+  bool trusted_current = false, trusted_voltage = false;  ///< the columns above are theirs
   double initial_soc = 0.5;
   double initial_soc_sigma = 0.005;  ///< its standard deviation
   bool initial_soc_given = true;     ///< by a user; otherwise derived from the first voltage

@@ -61,19 +61,36 @@ bool check_units(Record& r, const Cell& cell, RecordingCheck& found) {
   return !found.faults.empty();
 }
 
+/// Returns true if the voltage leaves the limits together with a step of the current, or without a jump: that of a
+/// dropout jumps while the current does not. rows: beyond the limits, from `from` to before `end`.
+bool is_voltage_drop(const Record& r, const Cell& cell, std::size_t from, std::size_t end) {
+  const auto goes_along = [&](std::size_t k) {
+    return std::abs(r.voltage_v[k] - r.voltage_v[k - 1]) < fault_limits.spike_v ||
+           std::abs(r.current_a[k] - r.current_a[k - 1]) > fault_limits.edge_c * cell.capacity_ah;
+  };
+  for (std::size_t k = from; k < end; ++k) {
+    if (!(r.voltage_v[k] > 0) || !(std::abs(r.current_a[k]) > fault_limits.edge_c * cell.capacity_ah)) return false;
+  }
+  return from > 0 && goes_along(from) && (end == r.size() || goes_along(end));
+}
+
 /// Readings that no cell gives.
 void check_dropouts(Record& r, const Cell& cell, RecordingCheck& found) {
   const double low_v = cell.limits.voltage_min_v - fault_limits.outside_limits_v,
                high_v = cell.limits.voltage_max_v + fault_limits.outside_limits_v;
+  const auto outside = [&](std::size_t k) {
+    return std::isfinite(r.voltage_v[k]) && (r.voltage_v[k] < low_v || r.voltage_v[k] > high_v);
+  };
+  std::vector<measurement::Rows> runs;
+  for (const measurement::Rows& run : measurement::consecutive_rows(r.size(), outside)) {
+    if (!is_voltage_drop(r, cell, run.begin, run.end)) runs.push_back(run);
+  }
   std::vector<model::Span> spans;
   std::size_t dropped = 0;
-  for (std::size_t k = 0; k < r.size(); ++k) {
-    if (!std::isfinite(r.voltage_v[k]) || (r.voltage_v[k] >= low_v && r.voltage_v[k] <= high_v)) continue;
-    const bool goes_on = k > 0 && !spans.empty() && spans.back().end_s == r.time_s[k - 1];
-    if (!goes_on) spans.push_back({r.time_s[k], r.time_s[k]});
-    spans.back().end_s = r.time_s[k];
-    r.voltage_v.edit()[k] = no_reading;
-    ++dropped;
+  for (const measurement::Rows& run : runs) {
+    spans.push_back({r.time_s[run.begin], r.time_s[run.end - 1]});
+    for (std::size_t k = run.begin; k < run.end; ++k) r.voltage_v.edit()[k] = no_reading;
+    dropped += run.size();
   }
   if (dropped > readings_at_most(r)) {
     found.faults.push_back(
@@ -265,16 +282,17 @@ void check_sign(Record& r, const Cell& cell, RecordingCheck& found) {
   const bool by_edges = edges.steps >= fault_limits.edges_for_sign &&
                         edges.product < fault_limits.inverted_correlation * edges.limit &&
                         edges.opposed > edges.steps * fault_limits.inverted_edges / fault_limits.inverted_of;
-  if (by_edges || moves_against_charge(r, cell)) {
-    found.faults.push_back(
-        {"current_inverted",
-         "The voltage falls where the current rises, so the sign of the current is inverted. Charging "
-         "must be positive: change the sign.",
-         {}});
-  }
+  if (by_edges || moves_against_charge(r, cell)) found.faults.push_back(inverted_current());
 }
 
 }  // namespace
+
+DataFault inverted_current() {
+  return {"current_inverted",
+          "The voltage falls where the current rises, so the sign of the current is inverted. Charging "
+          "must be positive: change the sign.",
+          {}};
+}
 
 double longest_unchanged_s(std::span<const double> time_s, std::span<const double> current_a, double capacity_ah) {
   const double usual_step_s = measurement::upper_median(measurement::time_steps(time_s));

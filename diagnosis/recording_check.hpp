@@ -25,6 +25,9 @@ struct RecordingCheck {
   std::vector<std::string> warnings;  ///< readings that were removed
 };
 
+/// The current has the wrong sign.
+DataFault inverted_current();
+
 /// The longest time [s] between rows in which nothing changed, if the logger writes rows on change; else 0. Such a
 /// logger makes many long steps, and the current is the same at both ends of nearly all of them. One that stops in a
 /// drive comes back at another current.

@@ -107,6 +107,8 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
   Range soc, read_a, temperature_c;
   std::set<int> rates;
   std::vector<double> steps_s;
+  facts.trusted_current = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_current; });
+  facts.trusted_voltage = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_voltage; });
   for (const PreparedRecording& r : records) {
     facts.duration_s += r.duration_s();
     facts.duration_h += r.duration_s() / 3'600;

@@ -30,11 +30,12 @@ struct RecordingFacts {
   double temperature_span_k = 0;  ///< 0: not recorded, or constant
   double away_k = 0;              ///< largest distance from reference_c; 0: not recorded
   double longest_rest_s = 0;
-  std::size_t reversals = 0;         ///< turns of the charge's direction
-  std::size_t rates = 0;             ///< sizes of current
-  bool start_given = false;          ///< a user gave the initial soc of one at least
-  bool trusted_instruments = false;  ///< readings of trusted instruments exist
-  double zero_error_sigmas = 0;      ///< of the current sensor's zero, by its checks where no current flows
+  std::size_t reversals = 0;                              ///< turns of the charge's direction
+  std::size_t rates = 0;                                  ///< sizes of current
+  bool start_given = false;                               ///< a user gave the initial soc of one at least
+  bool trusted_instruments = false;                       ///< readings of trusted instruments exist
+  bool trusted_current = false, trusted_voltage = false;  ///< all readings are those of trusted instruments
+  double zero_error_sigmas = 0;  ///< of the current sensor's zero, by its checks where no current flows
   std::optional<double> rail_a;  ///< largest current, if it is reached often enough to show that the sensor ends there
   double error_v = 0;            ///< RMS of measured less cell file's voltage; 0 unless describe() fills it in
 };

@@ -1,5 +1,6 @@
 #include "diagnosis/reference.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
@@ -77,6 +78,12 @@ void set_deviation(Check& check, double readings, const model::CellParameters<>&
 
 void average_references(PreparedRecording& r, std::span<const double> current_ref_a,
                         std::span<const double> voltage_ref_v, const model::CellParameters<>& cell) {
+  const auto covers = [&](std::span<const double> reference) {
+    const auto readings = std::count_if(reference.begin(), reference.end(), [](double x) { return std::isfinite(x); });
+    return static_cast<double>(readings) > reference_limits.covers * static_cast<double>(r.size());
+  };
+  if (covers(current_ref_a)) r.current_ref_a = std::vector<double>(current_ref_a.begin(), current_ref_a.end());
+  if (covers(voltage_ref_v)) r.voltage_ref_v = std::vector<double>(voltage_ref_v.begin(), voltage_ref_v.end());
   add_checks(r, {Check::Channel::current, r.current_a, current_ref_a, reference_limits.still_c * cell.capacity_ah},
              cell);
   add_checks(r, {Check::Channel::voltage, r.voltage_v, voltage_ref_v, reference_limits.still_v}, cell);

@@ -10,9 +10,10 @@
 
 namespace bms::diagnosis {
 
-/// Averages rows that have a reference to checks, over Thresholds::References::check_at_most_s at most. Columns as long
-/// as the record, NaN where there was no reference, or empty. With the contactor open (current_ref_a 0) voltage_ref_v
-/// may be a source's voltage instead of the cell's: such a voltage is removed from the record (NaN).
+/// Keeps the readings of a trusted instrument that read in nearly all rows (trusted_readings.hpp). Averages rows that
+/// have a reference to checks, over Thresholds::References::check_at_most_s at most. Columns as long as the record, NaN
+/// where there was no reference, or empty. With the contactor open (current_ref_a 0) voltage_ref_v may be a source's
+/// voltage instead of the cell's: such a voltage is removed from the record (NaN).
 void average_references(PreparedRecording& record, std::span<const double> current_ref_a,
                         std::span<const double> voltage_ref_v, const model::CellParameters<>& cell);
 

@@ -8,10 +8,18 @@
 
 namespace bms::diagnosis {
 
+bool reads_trusted(const RecordingFacts& facts, std::size_t mechanism) {
+  const std::string_view id = model::catalogue[mechanism].id;
+  const bool of_current = id.starts_with("current_") || id == model::ChannelSkew::id,
+             of_voltage = id.starts_with("voltage_") || id.starts_with("contact_");
+  return (facts.trusted_current && of_current) || (facts.trusted_voltage && of_voltage);
+}
+
 std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const Hypothesis& given,
                                         std::size_t mechanism) {
   const MechanismKnowledge& knowledge = knowledge_of(mechanism);
   const RecordingFacts& facts = likelihood.facts();
+  if (reads_trusted(facts, mechanism)) return "a trusted instrument's readings are used";
   // two with the same recording would grow without bounds in opposite directions
   const std::size_t same = knowledge.same_recording_as;
   if (same != no_mechanism && given.find(same) != nullptr && !facts.trusted_instruments)

@@ -287,12 +287,12 @@ struct Thresholds {
 
   /// Readings of trusted instruments.
   struct References {
-    double check_at_most_s = 300;           ///< [s] readings averaged to one check
-    double filter_share = 0.1;              ///< of a stretch at its start, where a filtered channel may still move
+    double covers = 0.9;           ///< share of the rows from which a trusted instrument takes the place of the own
+    double check_at_most_s = 300;  ///< [s] readings averaged to one check
+    double filter_share = 0.1;     ///< of a stretch at its start, where a filtered channel may still move
     double still_v = 0.02, still_c = 0.02;  ///< [V], [C] by which a reference moves within a check
     double unsteady_share = 0.05;           ///< of an instrument's error that differs from time to time
-    double meter_v = 3e-4;                  ///< [V] standard deviation of a trusted voltmeter
-    double meter_c = 3e-5;                  ///< [C] of a trusted ammeter
+    double meter_v = 3e-4, meter_c = 3e-5;  ///< [V], [C] standard deviation of a trusted voltmeter and ammeter
   };
 
   /// What the current sensor reads in rests after a discharge (idle_reading.hpp).
@@ -329,7 +329,7 @@ struct Thresholds {
     double spread_counts = 1;         ///< as if so many more blocks had shown log_spread. With 1 false alarms keep
                                       ///< their rate up to a spread of 1.5; pooled over 17 sets of NASA B0005, B0007
                                       ///< and B0025 it is 0.48
-    double blocks_at_least = 3;       ///< for a Student distribution
+    double blocks_at_least = 2;       ///< for a Student distribution
     double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
     double temperature_beyond_k = 5;  ///< [K]
     double current_beyond = 1.25;     ///< times their largest current

@@ -1,0 +1,119 @@
+#include "benchmark/real_cell.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "files/recording.hpp"
+#include "files/text_file.hpp"
+#include "workflow/diagnose_recordings.hpp"
+#include "workflow/identify_cell.hpp"
+
+namespace bms::benchmark {
+
+namespace {
+
+using measurement::Recording;
+
+constexpr const char *calibration_part = "semi_real_calibration.csv", *test_part = "semi_real_test.csv";
+
+/// Rows of a recording from `first` on.
+Recording part(const Recording& r, std::size_t first, std::size_t count) {
+  Recording p = r;
+  for (auto column : {&Recording::time_s, &Recording::current_a, &Recording::voltage_v, &Recording::temperature_c,
+                      &Recording::soc_ref, &Recording::current_ref_a, &Recording::voltage_ref_v}) {
+    if (!(r.*column).empty()) p.*column = (r.*column).part(first, count);
+  }
+  return p;
+}
+
+std::string csv_of(const Recording& r) {
+  std::string text = "time_s,current_a,voltage_v";
+  if (!r.temperature_c.empty()) text += ",temperature_c";
+  if (!r.soc_ref.empty()) text += ",soc_ref";
+  text += "\n";
+  for (std::size_t k = 0; k < r.rows(); ++k) {
+    text += fmt::format("{},{},{}", r.time_s[k], r.current_a[k], r.voltage_v[k]);
+    if (!r.temperature_c.empty()) text += fmt::format(",{}", r.temperature_c[k]);
+    if (!r.soc_ref.empty()) text += fmt::format(",{}", r.soc_ref[k]);
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<RealSet> read_sets(files::TomlTable& list) {
+  std::vector<RealSet> sets;
+  for (files::TomlTable& t : list.tables("set")) {
+    RealSet s;
+    s.name = t.text("name");
+    s.cell = t.text("cell");
+    s.start = t.text("start");
+    s.calibration = t.texts("calibration");
+    s.held_out = t.flag("held_out");
+    if (t.has("healthy")) s.healthy = t.texts("healthy");
+    if (t.has("ocv")) s.ocv = t.texts("ocv");
+    if (t.has("ocv_from_rests")) s.ocv_from_rests = t.flag("ocv_from_rests");
+    if (t.has("ocv_from_load")) s.ocv_from_load = t.flag("ocv_from_load");
+    if (t.has("initial_soc")) s.initial_soc = t.number("initial_soc");
+    if (t.has("chemistry")) s.chemistry = t.text("chemistry");
+    if (t.has("capacity_ah")) s.capacity_ah = t.number("capacity_ah");
+    if (t.has("calibration_current")) s.calibration_current = t.text("calibration_current");
+    if (t.has("calibration_from_s")) s.calibration_from_s = t.number("calibration_from_s");
+    if (t.has("cells_in_parallel")) s.cells_in_parallel = t.number("cells_in_parallel");
+    if (t.has("test")) s.test = t.text("test");
+    t.finish();
+    sets.push_back(std::move(s));
+  }
+  return sets;
+}
+
+Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_healthy) {
+  const auto path = [&](const std::string& name) { return (std::filesystem::path(data_folder) / name).string(); };
+  workflow::IdentifyOptions options;
+  options.start = set.start;
+  for (const std::string& slow : set.ocv) options.ocv.push_back(path(slow));
+  options.chemistry = set.chemistry;
+  options.capacity_ah = set.capacity_ah;
+  options.ocv_from_rests = set.ocv_from_rests;
+  options.ocv_from_load = set.ocv_from_load;
+  if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
+  Prepared p;
+  const std::filesystem::path folder = std::filesystem::temp_directory_path();
+  std::string test = path(set.test);
+  if (set.test.empty()) {
+    const Recording whole = files::read_recording(path(set.calibration.front()));
+    const auto save = [&](const char* name, std::size_t first, std::size_t end) {
+      files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
+      return (folder / name).string();
+    };
+    options.recordings = {save(calibration_part, 0, whole.rows() / 2)};
+    test = save(test_part, whole.rows() / 2, whole.rows());
+  } else {
+    for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
+    if (!set.calibration_current.empty()) {
+      files::ReadOptions reading;
+      reading.map = {"current_a=" + set.calibration_current};
+      const Recording whole =
+          files::read_recording(options.recordings.front(), files::VoltageColumn::required, reading);
+      const auto first = std::lower_bound(whole.time_s.begin(), whole.time_s.end(), set.calibration_from_s);
+      files::write_file((folder / calibration_part).string(),
+                        csv_of(part(whole, static_cast<std::size_t>(first - whole.time_s.begin()), whole.rows())));
+      options.recordings = {(folder / calibration_part).string()};
+    }
+  }
+  for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
+  if (set.healthy.empty()) options.healthy = options.recordings;
+  if (!learn_healthy) options.healthy.clear();
+  options.name = "calibrated";
+  p.cell = *workflow::identify_cell(options).cell_file;
+  if (set.cells_in_parallel > 1) workflow::scale_to(set.cells_in_parallel * p.cell.parameters.capacity_ah, p.cell);
+  p.test = workflow::read_for_diagnosis(test, {}, p.cell);
+  for (const char* name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
+  return p;
+}
+
+}  // namespace bms::benchmark

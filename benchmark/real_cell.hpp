@@ -1,0 +1,38 @@
+// Real recordings of a list, and the cell file that is identified from the healthy ones among them.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "files/cell_file.hpp"
+#include "files/toml_table.hpp"
+#include "measurement/recording.hpp"
+
+namespace bms::benchmark {
+
+/// A [[set]] of the list: recordings of one cell.
+struct RealSet {
+  std::string name, cell, start, chemistry, test;
+  std::string calibration_current;  ///< column of `calibration` in the place of current_a; empty: none
+  double calibration_from_s = 0;    ///< and only its rows from this time on
+  double capacity_ah = 0, cells_in_parallel = 1;
+  bool held_out = false;  ///< the rules were not developed on this cell
+  bool ocv_from_rests = false, ocv_from_load = false;
+  std::optional<double> initial_soc;
+  std::vector<std::string> calibration, healthy, ocv;
+};
+
+/// All [[set]] of the list.
+std::vector<RealSet> read_sets(files::TomlTable& list);
+
+/// The identified cell and the recording that is left out.
+struct Prepared {
+  files::CellFile cell;
+  measurement::Recording test;
+};
+
+/// Throws a runtime_error if no cell file follows from the recordings. learn_healthy: with [healthy].
+Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_healthy);
+
+}  // namespace bms::benchmark

@@ -1,0 +1,29 @@
+// Several recordings together can be harder to explain than each of them: contacts differ from one to the next, a cell
+// ages. What one of them shows by itself is not lost because others were given as well.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "diagnosis/prepared_recording.hpp"
+#include "diagnosis/verdict.hpp"
+#include "model/cell_parameters.hpp"
+
+namespace bms::diagnosis {
+
+/// Settings of a hypothesis of several recordings as they act in one of them: a contact changes in the first one at its
+/// moment, in later ones before their start.
+std::vector<MechanismSetting> settings_in(const std::vector<PreparedRecording>& records, std::size_t record,
+                                          std::vector<MechanismSetting> settings);
+
+/// The views of all recordings, from the cell file and from the extended cell.
+void set_views(Diagnosis& d, const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
+               const std::vector<PreparedRecording>& records);
+
+/// The answer of the recording that names a cause with the largest gain; `together`, which names none, if none does.
+/// The false alarm rate is that of one recording, as always.
+Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cell,
+                          const std::vector<MechanismSetting>& own, const std::vector<PreparedRecording>& records,
+                          const std::function<Diagnosis(const PreparedRecording&)>& diagnose_one);
+
+}  // namespace bms::diagnosis
