@@ -12,6 +12,7 @@ namespace bms::diagnosis {
 std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const Hypothesis& given,
                                         std::size_t mechanism) {
   const MechanismKnowledge& knowledge = knowledge_of(mechanism);
+  if (knowledge.only_a_term) return "it is a term of an unknown cause";
   const RecordingFacts& facts = likelihood.facts();
   // two with the same recording would grow without bounds in opposite directions
   const std::size_t same = knowledge.same_recording_as;

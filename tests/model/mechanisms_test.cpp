@@ -461,6 +461,23 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
   }
 }
 
+TEST(LoadMemory, FollowsChargeAndDischargeByAResistanceOfItsOwn) {
+  const auto cell = tests::prepared<double>();
+  const std::vector<MechanismSetting> memory = {{mechanism_index("load_memory"), {0.004, -0.003, 200}, {}}};
+  OpenLoopSimulation<double> with(cell, capacity_ah, chosen<double>(memory, capacity_ah), 0.5),
+      without(cell, capacity_ah, ChosenLaws<double>{}, 0.5);
+  const auto no_change = [](TablePoint<double>&, double) {};
+  double u_v = 0;
+  for (int k = 1; k < 3'000; ++k) {
+    const double a = k < 1'000 ? 3 : k < 2'000 ? -3 : 0;
+    u_v += -std::expm1(-1.0 / 200) * ((a > 0 ? 0.004 : -0.003) * a - u_v);
+    const double v = with.step(k, 1, a, 25, no_change), base_v = without.step(k, 1, a, 25, no_change);
+    ASSERT_NEAR(v - base_v, u_v, 1e-12) << k;
+    if (k == 999) EXPECT_NEAR(u_v, 0.012, 1e-4);
+    if (k == 1'999) EXPECT_NEAR(u_v, 0.009, 1e-4) << "up in discharge as well";
+  }
+}
+
 /// table9 with mechanisms that depend on the temperature, valid at a temperature. What a cell file of 25 degrees C
 /// states is converted here by formulas of this test. self_heating keeps the reference of 25 degrees C for its own.
 struct ReferencedCell {
