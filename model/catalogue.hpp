@@ -36,10 +36,10 @@
 namespace bms::model {
 
 using Catalogue =
-    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,        // readings
-               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                 // charge
-               SlowPolarisation, FastPolarisation, LoadMemory, BranchTemperature, OcvHysteresis,   // states
-               SelfHeating,                                                                        // a state
+    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,       // readings
+               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                // charge
+               SlowPolarisation, FastPolarisation, LoadMemory, BranchTemperature, OcvHysteresis,  // states
+               SelfHeating,                                                                       // a state
                ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer,
                ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
                VoltageOffset, VoltageGain>;                              // the reading of the voltage

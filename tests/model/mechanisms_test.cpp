@@ -3,6 +3,7 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -469,7 +470,7 @@ TEST(LoadMemory, FollowsChargeAndDischargeByAResistanceOfItsOwn) {
   const auto no_change = [](TablePoint<double>&, double) {};
   double u_v = 0;
   for (int k = 1; k < 3'000; ++k) {
-    const double a = k < 1'000 ? 3 : k < 2'000 ? -3 : 0;
+    const double a = std::array{3, -3, 0}[static_cast<std::size_t>(k) / 1'000];
     u_v += -std::expm1(-1.0 / 200) * ((a > 0 ? 0.004 : -0.003) * a - u_v);
     const double v = with.step(k, 1, a, 25, no_change), base_v = without.step(k, 1, a, 25, no_change);
     ASSERT_NEAR(v - base_v, u_v, 1e-12) << k;
