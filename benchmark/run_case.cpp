@@ -36,6 +36,9 @@ std::string figures_of(const diagnosis::Diagnosis& d) {
   if (d.law)
     figures += fmt::format(" law {} {:.2f}->{:.2f} mV x{:g}{}", d.law->law, 1e3 * d.law->left_out_before_v,
                            1e3 * d.law->left_out_after_v, d.law->times_tolerance, d.law->cell ? " term" : "");
+  if (d.law && d.law->mechanism) {
+    for (const double v : d.law->mechanism->value) figures += v == 0 ? "" : fmt::format(" {:.3g}", v);
+  }
   for (const diagnosis::LawEvidence& e : d.law ? d.law->laws : std::vector<diagnosis::LawEvidence>{})
     figures += fmt::format(" {} by {} {:.0f}", e.law, e.depends_on, e.gain);
   for (const diagnosis::Finding& f : d.findings) {
@@ -107,11 +110,11 @@ Outcome run_case(const truth::Case& c) {
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {
     // as the tool: without causes that were not named
-    const std::vector<diagnosis::MechanismSetting> named =
-        diagnosis::names(d.verdict) ? diagnosis::later_recording(d.extended, c.holdout_initial_soc)
-                                    : std::vector<diagnosis::MechanismSetting>{};
+    std::vector<diagnosis::MechanismSetting> added;
+    if (diagnosis::names(d.verdict)) added = diagnosis::later_recording(d.extended, c.holdout_initial_soc);
+    if (o.has_term) added = diagnosis::with_term({}, *d.law);
     holdout_v =
-        diagnosis::predict(d.cell, named, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
+        diagnosis::predict(d.cell, added, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
   o.next = follow_up(c, cell, recording, d);

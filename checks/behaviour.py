@@ -58,6 +58,7 @@ MECHANISMS = (  # all of the catalogue, with values that a cell of 6 Ah might ha
     "current_clipping:excess_a=2,limit_a=7,knee=0.1", "temperature_sensor:offset_k=3,lag_s=200",
     "initial_soc:shift=0.05", "capacity_change:loss_fraction=0.1", "coulombic_loss:loss_fraction=0.004",
     "leakage:current_a=0.002", "fast_polarisation:resistance_ohm=0.002,time_constant_s=1.5",
+    "load_memory:charge_ohm=0.003,discharge_ohm=-0.002,time_constant_s=900",
     "slow_polarisation:resistance_ohm=0.004,time_constant_s=600,faster_share=0.2,surface_lag_s=150",
     "self_heating:thermal_resistance_k_per_w=8,time_constant_s=900,activation_j_per_mol=25000",
     "resistance_growth:fraction=0.3", "polarisation_growth:r1_fraction=0.2,c1_fraction=-0.3",

@@ -46,7 +46,9 @@ bool is_uninformative(const LikelihoodModel& likelihood, Diagnosis& d) {
   if (!why) return false;
   d.verdict = Verdict::not_testable;
   d.statement = "No diagnosis is possible: " + *why + ". Record several minutes with a changing load.";
-  for (std::size_t m = 0; m < model::mechanism_count; ++m) d.not_testable.push_back({m, *why});
+  for (std::size_t m = 0; m < model::mechanism_count; ++m) {
+    if (!knowledge_of(m).only_a_term) d.not_testable.push_back({m, *why});
+  }
   return true;
 }
 

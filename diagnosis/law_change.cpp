@@ -14,7 +14,7 @@ double value_of(const LawTerm& term, const model::TablePoint<double>& at) {
 }  // namespace
 
 std::vector<LawChange> law_changes(const Diagnosis& d, const model::CellParameters<>& before) {
-  if (!d.law || !d.law->cell) return {};
+  if (!d.law || !d.law->cell || d.law->mechanism) return {};
   double low = 1, high = 0;
   for (const RecordingView& view : d.views) {
     for (const double soc : view.soc) {

@@ -13,7 +13,8 @@ struct LawChange {
   double soc, change;  ///< of the law's table: V for the OCV, ohm for R0 or R1
 };
 
-/// Points at states of charge that the recordings have reached. before: the cell file. Empty without a term.
+/// Points at states of charge that the recordings have reached. before: the cell file. Empty without a term
+/// in a table.
 std::vector<LawChange> law_changes(const Diagnosis& d, const model::CellParameters<>& before);
 
 }  // namespace bms::diagnosis

@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "diagnosis/block_covariance.hpp"
+#include "diagnosis/mechanisms/load_memory.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
@@ -49,16 +51,25 @@ std::vector<PreparedRecording> without_fold(const std::vector<PreparedRecording>
   return kept;
 }
 
+/// What is fitted where parts are left out.
+struct TermModel {
+  Loosened loosened;
+  std::optional<MechanismSetting> mechanism;
+
+  /// Where its fit begins.
+  Hypothesis start(const Hypothesis& base) const { return mechanism ? with(base, *mechanism) : base; }
+};
+
 /// Errors of the readings that were left out, by block.
 using BlockErrors = std::vector<measurement::MeanSquare>;
 
 /// Of the blocks of one fold, fitted on the others.
-void add_left_out(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loosened, const Folds& folds,
+void add_left_out(const LikelihoodModel& all, const NoiseModel& nominal, const TermModel& model, const Folds& folds,
                   std::size_t fold, BlockErrors& errors) {
   const Hypothesis base = all.base();
-  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), folds, fold), nominal, loosened,
-                             all.learned());
-  const HypothesisFit fit = kept.fit(base);
+  const LikelihoodModel kept(all.cell(), base.settings, without_fold(all.records(), folds, fold), nominal,
+                             model.loosened, all.learned());
+  const HypothesisFit fit = kept.fit(model.start(base));
   for (std::size_t r = 0; r < all.records().size(); ++r) {
     const std::vector<double> volts = kept.voltage(fit.hypothesis, fit.calibration, r);
     for (std::size_t k = 0; k < volts.size(); ++k) {
@@ -71,7 +82,7 @@ void add_left_out(const LikelihoodModel& all, const NoiseModel& nominal, const L
 
 /// Of several models; each fold writes blocks of its own.
 std::vector<BlockErrors> left_out(const LikelihoodModel& all, const NoiseModel& nominal,
-                                  const std::vector<Loosened>& models, const Folds& folds) {
+                                  const std::vector<TermModel>& models, const Folds& folds) {
   std::vector<BlockErrors> errors(models.size(), BlockErrors(all.records().size() * folds.blocks));
   measurement::in_parallel(models.size() * term_limits.folds, [&](std::size_t k) {
     const std::size_t model = k / term_limits.folds;
@@ -105,23 +116,35 @@ bool improves(const BlockErrors& before, const BlockErrors& after) {
   return mean > term_limits.improves_sigmas * std::sqrt(std::max(variance, 0.0));
 }
 
-Loosened loosened(const TableLaw& law, double times) {
-  Loosened l;
-  l.*law.loosened = times;
-  return l;
+/// Returns true if a model pays on short parts that are left out, and does no harm on long ones.
+bool pays(const LikelihoodModel& likelihood, const NoiseModel& nominal, const TermModel& model,
+          const BlockErrors& before, const BlockErrors& after) {
+  if (!(rms_v(after) < term_limits.error_left * rms_v(before))) return false;
+  if (!improves(before, after)) return false;
+  const std::vector<BlockErrors> far = left_out(likelihood, nominal, {TermModel{}, model}, long_blocks);
+  return rms_v(far[1]) <= rms_v(far[0]);
 }
 
-model::CellParameters<> cell_with_term(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loose) {
-  const Hypothesis base = all.base();
-  const LikelihoodModel free(all.cell(), base.settings, all.records(), nominal, loose, all.learned());
-  const HypothesisFit fit = free.fit(base);
-  return free.calibration().applied(all.cell(),
-                                    {fit.calibration.data(), fit.calibration.data() + fit.calibration.size()});
+TermModel loosened(const TableLaw& law, double times) {
+  TermModel m;
+  m.loosened.*law.loosened = times;
+  return m;
+}
+
+LikelihoodModel likelihood_with(const LikelihoodModel& all, const NoiseModel& nominal, const Loosened& loose) {
+  return {all.cell(), all.base().settings, all.records(), nominal, loose, all.learned()};
+}
+
+/// With a fit's base parameters; nothing if a cell file does not accept them, for example an OCV that falls.
+std::optional<model::CellParameters<>> fitted_cell(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  const model::CellParameters<> cell = likelihood.calibration().applied(
+      likelihood.cell(), {fit.calibration.data(), fit.calibration.data() + fit.calibration.size()});
+  return model::first_fault(cell).what == nullptr ? std::optional(cell) : std::nullopt;
 }
 
 /// Learns the term of a law with a table, if it pays on what is left out.
 void learn_table(const LikelihoodModel& likelihood, const NoiseModel& nominal, const TableLaw& law, LawTerm& term) {
-  std::vector<Loosened> models = {Loosened{}};
+  std::vector<TermModel> models = {TermModel{}};
   for (const double times : term_limits.times_tolerance) models.push_back(loosened(law, times));
   const std::vector<BlockErrors> errors = left_out(likelihood, nominal, models, short_blocks);
   term.left_out_before_v = rms_v(errors.front());
@@ -132,16 +155,45 @@ void learn_table(const LikelihoodModel& likelihood, const NoiseModel& nominal, c
   term.left_out_after_v = rms_v(errors[chosen]);
   if (chosen == 0) return;
   term.times_tolerance = term_limits.times_tolerance[chosen - 1];
-  if (!(term.left_out_after_v < term_limits.error_left * term.left_out_before_v)) return;
-  if (!improves(errors.front(), errors[chosen])) return;
-  const std::vector<BlockErrors> far = left_out(likelihood, nominal, {Loosened{}, models[chosen]}, long_blocks);
-  if (!(rms_v(far[1]) <= rms_v(far[0]))) return;
-  // a cell file does not accept every table, for example an OCV that falls
-  const model::CellParameters<> cell = cell_with_term(likelihood, nominal, models[chosen]);
-  if (model::first_fault(cell).what == nullptr) term.cell = cell;
+  if (!pays(likelihood, nominal, models[chosen], errors.front(), errors[chosen])) return;
+  const LikelihoodModel free = likelihood_with(likelihood, nominal, models[chosen].loosened);
+  term.cell = fitted_cell(free, free.fit(free.base()));
+}
+
+/// Learns the memory of the load, if it pays on what is left out.
+void learn_memory(const LikelihoodModel& likelihood, const NoiseModel& nominal, LawTerm& term) {
+  constexpr std::size_t memory = model::mechanism_index_of<model::LoadMemory>,
+                        time_constant = Knowledge<model::LoadMemory>::time_constant;
+  const LikelihoodModel plain = likelihood_with(likelihood, nominal, {});
+  if (plain.base().find(memory) != nullptr) return;
+  plain.linearise(plain.base(), plain.unchanged());  // which the fits share
+  std::array<std::optional<HypothesisFit>, term_limits.slow_s.size()> fits;
+  measurement::in_parallel(fits.size(), [&](std::size_t k) {
+    MechanismSetting start = model::default_setting(memory, plain.cell());
+    start.value[time_constant] = term_limits.slow_s[k];
+    fits[k] = plain.fit(with(plain.base(), start));
+  });
+  HypothesisFit& fit =
+      **std::min_element(fits.begin(), fits.end(), [](const auto& a, const auto& b) { return a->cost < b->cost; });
+  const TermModel model{{}, fit.hypothesis.settings.back()};
+  const std::vector<BlockErrors> errors = left_out(likelihood, nominal, {TermModel{}, model}, short_blocks);
+  term.left_out_before_v = rms_v(errors[0]);
+  term.left_out_after_v = rms_v(errors[1]);
+  // a strength or a time at its bound is not known
+  const bool at_bound = std::any_of(fit.at_bound.begin(), fit.at_bound.end(), [](char at) { return at != 0; });
+  if (at_bound || !pays(likelihood, nominal, model, errors[0], errors[1])) return;
+  term.cell = fitted_cell(plain, fit);
+  if (!term.cell) return;
+  include_model_error(plain, fit);
+  term.mechanism = fit.hypothesis.settings.back();
 }
 
 }  // namespace
+
+std::vector<MechanismSetting> with_term(std::vector<MechanismSetting> own, const LawTerm& term) {
+  if (term.mechanism) own.push_back(*term.mechanism);
+  return own;
+}
 
 std::string_view name_of_law(const LawTerm& term) {
   if (term.law == "ocv") return "the open-circuit voltage";
@@ -155,10 +207,8 @@ std::string_view name_of_law(const LawTerm& term) {
 }
 
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const NoiseModel& nominal) {
-  const Hypothesis base = likelihood.base();
-  const LikelihoodModel plain(likelihood.cell(), base.settings, likelihood.records(), nominal, {},
-                              likelihood.learned());
-  return law_evidence(plain, plain.fit(base));
+  const LikelihoodModel plain = likelihood_with(likelihood, nominal, {});
+  return law_evidence(plain, plain.fit(plain.base()));
 }
 
 std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal,
@@ -179,6 +229,7 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
   for (const TableLaw& law : table_laws) {
     if (term.law == law.id) learn_table(likelihood, nominal, law, term);
   }
+  if (term.law == "slow") learn_memory(likelihood, nominal, term);
   return term;
 }
 

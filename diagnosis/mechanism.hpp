@@ -102,6 +102,7 @@ struct DefaultKnowledge {
   static constexpr std::size_t same_recording_as = no_mechanism;  ///< its recordings cannot be distinguished from those
                                                                   ///< of this one, whatever the current
   static constexpr bool needs_first_strength = false;  ///< its other strengths mean nothing without the first
+  static constexpr bool only_a_term = false;           ///< learned for an unknown cause (law_term.hpp), never searched
   static constexpr double searched_unknowns = 0;       ///< searched in addition to the parameters
 
   /// What a finding says, with its number, as the beginning of a sentence.
@@ -184,7 +185,7 @@ struct MechanismKnowledge {
   bool probes_places, follows_temperature, outside_cell, report_limit;
   Fact facts;
   std::size_t same_recording_as;
-  bool needs_first_strength;
+  bool needs_first_strength, only_a_term;
   double searched_unknowns;
   std::string (*claim)(const MechanismSetting&);
   double (*temperature_sigma)(const MechanismSetting&);

@@ -24,6 +24,7 @@ constexpr MechanismKnowledge knowledge() {
           .facts = K::facts,
           .same_recording_as = K::same_recording_as,
           .needs_first_strength = K::needs_first_strength,
+          .only_a_term = K::only_a_term,
           .searched_unknowns = K::searched_unknowns,
           .claim = K::claim,
           .temperature_sigma = K::temperature_sigma,

@@ -326,6 +326,7 @@ Scope scope_of(const LikelihoodModel& likelihood) {
   Scope scope;
   const Hypothesis base = likelihood.base();
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
+    if (knowledge_of(m).only_a_term) continue;
     if (const auto reason = not_testable(likelihood, base, m)) scope.not_testable.push_back({m, *reason});
     if (base.find(m) != nullptr) continue;
     scope.searched.push_back(m);

@@ -18,6 +18,7 @@ bool reads_trusted(const RecordingFacts& facts, std::size_t mechanism) {
 std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const Hypothesis& given,
                                         std::size_t mechanism) {
   const MechanismKnowledge& knowledge = knowledge_of(mechanism);
+  if (knowledge.only_a_term) return "it is a term of an unknown cause";
   const RecordingFacts& facts = likelihood.facts();
   if (reads_trusted(facts, mechanism)) return "a trusted instrument's readings are used";
   // two with the same recording would grow without bounds in opposite directions

@@ -21,6 +21,7 @@
 #include "model/mechanisms/fast_polarisation.hpp"
 #include "model/mechanisms/initial_soc.hpp"
 #include "model/mechanisms/leakage.hpp"
+#include "model/mechanisms/load_memory.hpp"
 #include "model/mechanisms/ocv_hysteresis.hpp"
 #include "model/mechanisms/ocv_shape.hpp"
 #include "model/mechanisms/polarisation_growth.hpp"
@@ -35,9 +36,10 @@
 namespace bms::model {
 
 using Catalogue =
-    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,        // readings
-               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                 // charge
-               SlowPolarisation, FastPolarisation, BranchTemperature, OcvHysteresis, SelfHeating,  // states
+    std::tuple<ChannelSkew, CurrentOffset, CurrentGain, CurrentClipping, TemperatureSensor,       // readings
+               InitialSoc, CapacityChange, CoulombicLoss, Leakage,                                // charge
+               SlowPolarisation, FastPolarisation, LoadMemory, BranchTemperature, OcvHysteresis,  // states
+               SelfHeating,                                                                       // a state
                ResistanceGrowth, PolarisationGrowth, DirectionAsymmetry, TemperatureResistance, ChargeTransfer,
                ContactStep, ContactIntermittent, OcvShape, EntropicOcv,  // tables
                VoltageOffset, VoltageGain>;                              // the reading of the voltage

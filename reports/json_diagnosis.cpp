@@ -19,18 +19,24 @@ Json spans_of(const std::vector<model::Span>& spans) {
   return list;
 }
 
-Json mechanism_of(const diagnosis::Finding& f) {
-  const model::MechanismInfo& info = model::catalogue[f.setting.index];
-  const diagnosis::MechanismText& text = diagnosis::text_of_mechanism(f.setting.index);
+Json parameters_of(const diagnosis::MechanismSetting& setting) {
+  const model::MechanismInfo& info = model::catalogue[setting.index];
   Json parameters = Json::array();
   for (std::size_t k = 0; k < info.parameters; ++k) {
     parameters.push_back({{"name", info.parameter[k].name},
-                          {"value", number(f.setting.value[k])},
-                          {"std", number(f.setting.deviation[k])},
-                          {"unit", info.parameter[k].unit},
-                          {"at_bound", k < f.at_bound.size() && f.at_bound[k] != 0}});
+                          {"value", number(setting.value[k])},
+                          {"std", number(setting.deviation[k])},
+                          {"unit", info.parameter[k].unit}});
   }
-  return {{"id", info.id},
+  return parameters;
+}
+
+Json mechanism_of(const diagnosis::Finding& f) {
+  const diagnosis::MechanismText& text = diagnosis::text_of_mechanism(f.setting.index);
+  Json parameters = parameters_of(f.setting);
+  for (std::size_t k = 0; k < parameters.size(); ++k)
+    parameters[k]["at_bound"] = k < f.at_bound.size() && f.at_bound[k] != 0;
+  return {{"id", text.id},
           {"name", text.name},
           {"probability", number(f.probability)},
           {"equivalent_to", ids_of(f.equivalent_to)},
@@ -185,6 +191,9 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["left_out"] = d.law && d.law->cell ? Json{{"before_rmse_v", number(d.law->left_out_before_v)},
                                                  {"after_rmse_v", number(d.law->left_out_after_v)}}
                                           : Json(nullptr);
+  json["term"] = d.law && d.law->mechanism ? Json{{"id", model::catalogue[d.law->mechanism->index].id},
+                                                  {"parameters", parameters_of(*d.law->mechanism)}}
+                                           : Json(nullptr);
   json["detection_limits"] = limits_of(d);
   json["estimates"] = estimates_of(d);
   json["not_testable"] = Json::array();

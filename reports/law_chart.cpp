@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "diagnosis/law_change.hpp"
+#include "diagnosis/texts.hpp"
 
 namespace bms::reports {
 
@@ -25,6 +26,7 @@ nlohmann::json law_chart(const workflow::DiagnoseResult& r) {
           {"depends_on", term->depends_on},
           {"before_mv", 1e3 * term->left_out_before_v},
           {"after_mv", 1e3 * term->left_out_after_v},
+          {"claim", term->mechanism ? diagnosis::claim(*term->mechanism) : ""},
           {"title", title_of(*term)},
           {"unit", term->law == "ocv" ? "mV" : "mΩ"},
           {"curve", std::move(curve)}};

@@ -57,6 +57,7 @@ void compare(DiagnoseResult& r) {
   };
   const diagnosis::Hypothesis base{own, own.size(), {}};
   diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
+  if (r.has_term()) extended.settings = diagnosis::with_term(own, *r.diagnosis.law);
   simulate(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
   simulate(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
   simulate(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
@@ -97,10 +98,23 @@ std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
 
 namespace {
 
+/// Adds a mechanism with short numbers to the cell file.
+void add_setting(model::MechanismSetting setting, const std::string& source, files::CellFile& cell) {
+  const double capacity_ah = cell.parameters.capacity_ah;
+  const model::MechanismInfo& info = catalogue[setting.index];
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const double short_value = to_digits(setting.value[k], 6);
+    if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah))
+      setting.value[k] = short_value;
+    setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
+  }
+  files::put_mechanism(cell, setting);
+  cell.sources[files::table_of(info)] = source;
+}
+
 /// Adds a finding to the cell file with its source. What belongs to the recording is left out: its start, the branch on
 /// which it began, the moment of a contact's change.
 void add_finding(const DiagnoseResult& r, const std::string& files, const Finding& f, files::CellFile& cell) {
-  const double capacity_ah = r.cell.parameters.capacity_ah;
   const model::MechanismInfo& info = catalogue[f.setting.index];
   if (info.domain == model::Domain::start) return;
   model::MechanismSetting setting = f.setting;
@@ -112,14 +126,22 @@ void add_finding(const DiagnoseResult& r, const std::string& files, const Findin
     source += fmt::format("; since {:.0f} s of {}", f.setting.value[1], r.recordings.front().record.name);
   }
   if (!f.equivalent_to.empty()) source += "; these recordings cannot distinguish it from " + ids_of(f.equivalent_to);
-  for (std::size_t k = 0; k < info.parameters; ++k) {
-    const double short_value = to_digits(setting.value[k], 6);
-    if (short_value >= info.parameter[k].lower(capacity_ah) && short_value <= info.parameter[k].upper(capacity_ah))
-      setting.value[k] = short_value;
-    setting.deviation[k] = std::isfinite(setting.deviation[k]) ? to_digits(setting.deviation[k], 3) : 0;
+  add_setting(setting, source, cell);
+}
+
+/// Adds the term that was learned for an unknown cause.
+void add_term(const DiagnoseResult& r, const std::string& files, files::CellFile& cell) {
+  const diagnosis::LawTerm& law = *r.diagnosis.law;
+  cell.parameters = with_short_numbers(r.diagnosis.cell);
+  const std::string source =
+      fmt::format("term for an unknown cause in {} (bms diagnose of {})", name_of_law(law), files);
+  cell.source += "; with a " + source;
+  for (const char* table : {"ocv", "rc"}) {
+    cell.sources[table] += law.mechanism
+                               ? fmt::format("; adjusted within its tolerance to {}, together with the term", files)
+                               : "; with a " + source;
   }
-  files::put_mechanism(cell, setting);
-  cell.sources[files::table_of(info)] = source;
+  if (law.mechanism) add_setting(*law.mechanism, source, cell);
 }
 
 /// Widens the tolerance of OCV and drift to the residual of the extended cell on its own recordings.
@@ -142,11 +164,7 @@ files::CellFile extended_cell(const DiagnoseResult& r) {
   for (const RecordingComparison& c : r.recordings) files += (files.empty() ? "" : ", ") + c.record.name;
   if (r.has_term()) {
     if (!cell.name.ends_with("_extended")) cell.name += "_extended";
-    cell.parameters = with_short_numbers(r.diagnosis.cell);
-    const std::string source = fmt::format("; with a term for an unknown cause in {} (bms diagnose of {})",
-                                           diagnosis::name_of_law(*r.diagnosis.law), files);
-    for (const char* table : {"ocv", "rc"}) cell.sources[table] += source;
-    cell.source += source;
+    add_term(r, files, cell);
     return cell;
   }
   if (!r.named()) {

@@ -16,6 +16,7 @@
 #include "diagnosis/mechanisms/fast_polarisation.hpp"
 #include "diagnosis/mechanisms/initial_soc.hpp"
 #include "diagnosis/mechanisms/leakage.hpp"
+#include "diagnosis/mechanisms/load_memory.hpp"
 #include "diagnosis/mechanisms/ocv_hysteresis.hpp"
 #include "diagnosis/mechanisms/ocv_shape.hpp"
 #include "diagnosis/mechanisms/polarisation_growth.hpp"

@@ -9,6 +9,9 @@ const learned_law = (() => {
     const text = 'The difference acts on ' + law.name + '.' + depends;
     if (!law.after_mv) return text + ' No curve can be learned for it.';
     const errors = mv(law.before_mv) + ' to ' + mv(law.after_mv);
+    if (law.claim)
+      return text + ' The term that was learned: ' + law.claim +
+          '. With it the error on parts that were left out goes from ' + errors + '.';
     if (!law.curve.length)
       return text + ' A curve was not accepted: the error on parts that were left out goes from ' + errors +
           ', but not in all of them.';

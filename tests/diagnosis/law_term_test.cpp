@@ -10,6 +10,8 @@
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/prepare.hpp"
+#include "diagnosis/selection.hpp"
+#include "diagnosis/testability.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -23,8 +25,9 @@ std::optional<LawTerm> learned(const AddV& add_v) {
   return learn_law_term(likelihood, likelihood.noise(), law_evidence(likelihood, likelihood.noise()));
 }
 
-double error_v(const model::CellParameters<>& cell, const PreparedRecording& record) {
-  const std::vector<double> v = predict(cell, {}, record);
+double error_v(const model::CellParameters<>& cell, const std::vector<MechanismSetting>& settings,
+               const PreparedRecording& record) {
+  const std::vector<double> v = predict(cell, settings, record);
   double sum = 0;
   for (std::size_t k = 0; k < v.size(); ++k) sum += std::pow(v[k] - record.voltage_v[k], 2);
   return std::sqrt(sum / static_cast<double>(v.size()));
@@ -37,7 +40,7 @@ void expect_named_and_modelled(const char* law, const AddV& add_v) {
   EXPECT_LT(term->left_out_after_v, term->left_out_before_v);
   EXPECT_EQ(model::first_fault(*term->cell).what, nullptr) << model::first_fault(*term->cell).key;
   const PreparedRecording later = test::recorded(test::drive(1.5, 32), 0.7, 32, add_v);
-  EXPECT_LT(error_v(*term->cell, later), 0.5 * error_v(test::table9(), later)) << law;
+  EXPECT_LT(error_v(*term->cell, with_term({}, *term), later), 0.5 * error_v(test::table9(), {}, later)) << law;
 }
 
 TEST(LawTerm, AnOcvOfAnotherShapeIsNamedAndModelled) {
@@ -73,7 +76,29 @@ AddV lift(double at_1c_v) {
   };
 }
 
-TEST(LawTerm, AVoltageThatStaysAfterACurrentInEitherDirectionIsASlowPolarisation) { expect_named("slow", lift(0.02)); }
+TEST(LawTerm, AVoltageThatStaysAfterACurrentInEitherDirectionIsNamedAndModelled) {
+  expect_named_and_modelled("slow", lift(0.02));
+}
+
+TEST(LawTerm, ACellFileThatHasAMemoryOfTheLoadGetsNoSecondOne) {
+  const MechanismSetting small{model::mechanism_index_of<model::LoadMemory>, {1e-4, 1e-4, 1'000}, {}};
+  const LikelihoodModel likelihood =
+      likelihood_model_of(test::table9(), {small}, {test::recorded(test::drive(2, 31), 0.75, 31, lift(0.02))});
+  const auto term = learn_law_term(likelihood, likelihood.noise(), law_evidence(likelihood, likelihood.noise()));
+  ASSERT_TRUE(term);
+  EXPECT_EQ(term->law, "slow");
+  EXPECT_FALSE(term->cell);
+}
+
+TEST(LawTerm, IsNoCauseThatIsSearched) {
+  const LikelihoodModel likelihood =
+      likelihood_model_of(test::table9(), {}, {test::recorded(test::drive(2, 31), 0.75, 31)});
+  const Scope scope = scope_of(likelihood);
+  constexpr std::size_t memory = model::mechanism_index_of<model::LoadMemory>;
+  EXPECT_EQ(std::count(scope.searched.begin(), scope.searched.end(), memory), 0);
+  EXPECT_EQ(scope.searched.size(), model::mechanism_count - 1);
+  EXPECT_TRUE(not_testable(likelihood, likelihood.base(), memory)) << "not by those who search by themselves either";
+}
 
 TEST(LawTerm, WhatExplainsLessThanALawThatNoMechanismChangesIsNotNamed) {
   // a voltage that charging alone builds up: a mechanism explains most of it

@@ -128,6 +128,9 @@ loss_fraction = 0.003
 current_a = 0.001
 [mechanism.fast_polarisation]
 resistance_ohm = 0.002
+[mechanism.load_memory]
+charge_ohm = 0.002
+discharge_ohm = -0.001
 [mechanism.self_heating]
 thermal_resistance_k_per_w = 3
 [mechanism.resistance_growth]

@@ -95,6 +95,28 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
       << "the extended cell file explains the recording";
 }
 
+TEST_F(DiagnoseTool, LearnsATermForAnUnknownCauseThatOtherCommandsRun) {
+  const char* memory = "load_memory:charge_ohm=0.012,discharge_ohm=-0.008,time_constant_s=900";
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", memory) + " --holdout " +
+                        simulated("later.csv", memory, 2) + " --out " + path("x.toml"));
+  ASSERT_EQ(r["verdict"], "UNKNOWN");
+  EXPECT_EQ(r["law"], "slow");
+  EXPECT_TRUE(r["mechanisms"].empty());
+  ASSERT_TRUE(r["term"].is_object());
+  EXPECT_EQ(r["term"]["id"], "load_memory");
+  EXPECT_EQ(r["term"]["parameters"][0]["name"], "charge_ohm");
+  EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.5 * r["baseline"]["holdout"]["rmse_v"].get<double>());
+  EXPECT_THAT(content(path("x.toml")), HasSubstr("[mechanism.load_memory]\nsource = \"term for an unknown cause"));
+  EXPECT_EQ(run_tool("simulate --cell " + path("x.toml") + " --initial-soc 0.98 --recording " + shift + " --out " +
+                     path("s.csv"))
+                .exit_code,
+            0);
+  EXPECT_EQ(run_tool("replay " + shift + " --cell " + path("x.toml")).exit_code, 0);
+  EXPECT_EQ(result("--cell " + path("x.toml") + " --initial-soc 0.98 --recording " + path("now.csv"))["verdict"],
+            "NO_MISMATCH")
+      << "the extended cell file explains the recording";
+}
+
 TEST_F(DiagnoseTool, AContactStepIsPresentFromTheStartOfALaterRecording) {
   const json r =
       result("--cell table9 --initial-soc 0.98 --recording " +

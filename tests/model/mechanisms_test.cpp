@@ -3,6 +3,7 @@
 #include <ceres/jet.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
@@ -458,6 +459,24 @@ TEST(SlowPolarisation, IsAheadOfTheChargeThatIsCounted) {
                 u_v + look_up(cell, with.soc() + soc_shift_per_v * before_v).ocv_v - look_up(cell, with.soc()).ocv_v,
                 1e-12)
         << k;
+  }
+}
+
+TEST(LoadMemory, FollowsChargeAndDischargeByAResistanceOfItsOwn) {
+  const auto cell = tests::prepared<double>();
+  const std::vector<MechanismSetting> memory = {{mechanism_index("load_memory"), {0.004, -0.003, 200}, {}}};
+  OpenLoopSimulation<double> with(cell, capacity_ah, chosen<double>(memory, capacity_ah), 0.5),
+      without(cell, capacity_ah, ChosenLaws<double>{}, 0.5);
+  const auto no_change = [](TablePoint<double>&, double) {};
+  double u_v = 0;
+  for (int k = 1; k < 3'000; ++k) {
+    const double a = std::array{3, -3, 0}[static_cast<std::size_t>(k) / 1'000];
+    u_v += -std::expm1(-1.0 / 200) * ((a > 0 ? 0.004 : -0.003) * a - u_v);
+    const double v = with.step(k, 1, a, 25, no_change), base_v = without.step(k, 1, a, 25, no_change);
+    ASSERT_NEAR(v - base_v, u_v, 1e-12) << k;
+    if (k == 999 || k == 1'999) {  // up in charge, and in discharge as well
+      EXPECT_NEAR(v - base_v, k == 999 ? 0.012 : 0.009, 1e-4);
+    }
   }
 }
 

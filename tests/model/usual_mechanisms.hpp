@@ -28,6 +28,7 @@ inline const std::vector<UsualMechanism>& usual_mechanisms() {
       {"leakage", {0.002}},
       {"slow_polarisation", {0.004, 600, 0.2, 150}},
       {"fast_polarisation", {0.002, 1.5}},
+      {"load_memory", {0.003, -0.002, 900}},
       {"branch_temperature", {0.9, 0.3, 0.25, 0.4, 0.006, 0.002, 0, -0.002, 60'000, 35'000, 28'000, 30'000, 23}},
       {"ocv_hysteresis", {0.008, 40, 0.2, -0.5}},
       {"self_heating", {8, 900, 25'000, 26}},
