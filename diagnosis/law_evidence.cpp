@@ -10,6 +10,7 @@
 
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/generic_columns.hpp"
+#include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/residual_projection.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
@@ -19,7 +20,8 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::LawTerms& evidence_limits = thresholds.law_terms;
+constexpr const EvidenceThresholds& evidence_limits = law_thresholds.evidence;
+constexpr const LeapThresholds& leap_limits = law_thresholds.leaps;
 
 /// A form of a law: neighbouring columns.
 struct LawForm {
@@ -210,18 +212,18 @@ bool follows_in_leaps(const PreparedRecording& r) {
     if (!read.empty() && v != read.back()) moves.push_back(std::abs(v - read.back()));
     read.push_back(v);
   }
-  if (moves.size() < evidence_limits.leaps) return false;
+  if (moves.size() < leap_limits.moves) return false;
   std::sort(read.begin(), read.end());
   std::vector<double> gaps;
   for (std::size_t k = 1; k < read.size(); ++k) {
-    if (read[k] - read[k - 1] > evidence_limits.same_v) gaps.push_back(read[k] - read[k - 1]);
+    if (read[k] - read[k - 1] > leap_limits.same_v) gaps.push_back(read[k] - read[k - 1]);
   }
   if (gaps.empty()) return false;
   const double resolution_v = measurement::upper_median(gaps),
-               least_v = measurement::quantile(moves, evidence_limits.least_leap);
+               least_v = measurement::quantile(moves, leap_limits.least_quantile);
   // a noisy channel has small moves as well; one with coarse steps moves by one of them
-  return least_v > evidence_limits.leap_steps * resolution_v &&
-         least_v > evidence_limits.leap_share * measurement::upper_median(moves);
+  return least_v > leap_limits.steps * resolution_v &&
+         least_v > leap_limits.of_median * measurement::upper_median(moves);
 }
 
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const HypothesisFit& fit) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "diagnosis/block_covariance.hpp"
+#include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/mechanisms/load_memory.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
@@ -16,7 +17,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::LawTerms& term_limits = thresholds.law_terms;
+constexpr const TermThresholds& term_limits = law_thresholds.term;
 
 /// A law that has tables over the state of charge.
 struct TableLaw {
@@ -167,10 +168,10 @@ void learn_memory(const LikelihoodModel& likelihood, const NoiseModel& nominal, 
   const LikelihoodModel plain = likelihood_with(likelihood, nominal, {});
   if (plain.base().find(memory) != nullptr) return;
   plain.linearise(plain.base(), plain.unchanged());  // which the fits share
-  std::array<std::optional<HypothesisFit>, term_limits.slow_s.size()> fits;
+  std::array<std::optional<HypothesisFit>, term_limits.memory_s.size()> fits;
   measurement::in_parallel(fits.size(), [&](std::size_t k) {
     MechanismSetting start = model::default_setting(memory, plain.cell());
-    start.value[time_constant] = term_limits.slow_s[k];
+    start.value[time_constant] = term_limits.memory_s[k];
     fits[k] = plain.fit(with(plain.base(), start));
   });
   HypothesisFit& fit =
@@ -223,7 +224,7 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
   }
   const auto most =
       std::find_if(term.laws.begin(), term.laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  if (most == term.laws.end() || most->gain < term_limits.least_evidence) return std::nullopt;
+  if (most == term.laws.end() || most->gain < law_thresholds.evidence.least) return std::nullopt;
   term.law = most->law;
   term.depends_on = {most->depends_on};
   for (const TableLaw& law : table_laws) {

@@ -29,16 +29,16 @@ struct Check {
 struct PreparedRecording {
   std::string name;
   measurement::Column time_s;
-  measurement::Column current_a;           ///< NaN: no reading
-  measurement::Column voltage_v;           ///< NaN: no reading, or one that must not be used
-  measurement::Column temperature_c;       ///< empty: not recorded
+  measurement::Column current_a;      ///< NaN: no reading
+  measurement::Column voltage_v;      ///< NaN: no reading, or one that must not be used
+  measurement::Column temperature_c;  ///< empty: not recorded
+  double initial_soc = 0.5;
+  double initial_soc_sigma = 0.005;        ///< its standard deviation
+  bool initial_soc_given = true;           ///< by a user; otherwise derived from the first voltage
+  std::vector<Check> checks = {};          ///< made by reference.hpp
   measurement::Column current_ref_a = {};  ///< of a trusted ammeter that read in nearly all rows; else empty
   measurement::Column voltage_ref_v = {};  ///< the same of a voltmeter
-  bool trusted_current = false, trusted_voltage = false;  ///< the columns above are theirs
-  double initial_soc = 0.5;
-  double initial_soc_sigma = 0.005;  ///< its standard deviation
-  bool initial_soc_given = true;     ///< by a user; otherwise derived from the first voltage
-  std::vector<Check> checks;         ///< made by reference.hpp
+  bool trusted_current = false, trusted_voltage = false;  ///< current_a and voltage_v are theirs
 
   std::size_t size() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }

@@ -1,5 +1,5 @@
 // Every number that a verdict depends on. What belongs to one mechanism alone stands in diagnosis/mechanisms/, what
-// only keeps the arithmetic stable in numerics.hpp.
+// decides on a law without a known cause in law_thresholds.hpp, what only keeps the arithmetic stable in numerics.hpp.
 //
 // Costs and gains are differences of -2 log posterior (docs/diagnosis_method.md): an effect of x standard deviations
 // gains x^2. Currents in multiples of the capacity per hour end in _c (1C), shares and states of charge are fractions.
@@ -351,25 +351,6 @@ struct Thresholds {
     std::array<double, 7> factors = {1, 1.5, 2, 3, 4, 6, 8};
   };
 
-  /// A term for what no known cause explains (law_term.hpp).
-  struct LawTerms {
-    std::size_t folds = 3, blocks = 24;                  ///< of each recording: every third block is left out in turn
-    std::array<double, 3> times_tolerance = {20, 8, 3};  ///< of the law's tables
-    double error_left = 0.8;       ///< share of the error on what was left out, below which a term pays
-    double improves_sigmas = 1.5;  ///< mean improvement of the blocks left out over its standard deviation, at least
-    std::size_t long_blocks = 6;   ///< a term must do no harm either where so long parts are left out: next to short
-                                   ///< ones a drift of this recording looks like a law
-    double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
-    std::array<double, 3> fast_s = {4, 15, 60},
-                          slow_s = {250, 1'000, 4'000};  ///< [s] time constants of the load before, as memory_s
-    std::size_t late_rows = 2, leaps = 30, causes = 2;   ///< lateness tried; moves of a reading needed; causes doubted
-    double middle_c = 25, swing_k = 10;          ///< temperature at which nothing changes, and a usual distance from it
-    double ahead_soc = 0.05, slope_soc = 0.002;  ///< by which a part of the cell is ahead; for the slope of the OCV
-    /// Quantile that counts as the smallest leap; what it exceeds, of the median move and in steps of the resolution.
-    double least_leap = 0.02, leap_share = 0.3, leap_steps = 2.5, same_v = 1e-9;
-    double least_evidence = 20, narrowest = 1.0 / 64, widest = 4;  ///< of a law (healthy: less); prior, times free_v
-  };
-
   RecordingFaults recording;
   Noise noise;
   Priors priors;
@@ -391,7 +372,6 @@ struct Thresholds {
   Design design;
   Healthy healthy;
   ModelTolerance model_tolerance;
-  LawTerms law_terms;
 };
 
 inline constexpr Thresholds thresholds{};

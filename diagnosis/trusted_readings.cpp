@@ -14,8 +14,6 @@ namespace bms::diagnosis {
 
 namespace {
 
-using Channel = Check::Channel;
-
 double strength(const std::vector<InstrumentError>& errors, std::size_t mechanism) {
   const auto found = std::find_if(errors.begin(), errors.end(),
                                   [&](const InstrumentError& e) { return e.setting.index == mechanism; });
@@ -28,7 +26,7 @@ std::vector<double> current_of(const PreparedRecording& r, const std::vector<Ins
                gain = strength(errors, model::mechanism_index_of<model::CurrentGain>);
   std::vector<double> a(r.size());
   for (std::size_t k = 0; k < a.size(); ++k) {
-    const bool trusted = has_trusted(r, Channel::current) && std::isfinite(r.current_ref_a[k]);
+    const bool trusted = has_trusted(r, Check::Channel::current) && std::isfinite(r.current_ref_a[k]);
     a[k] = trusted ? r.current_ref_a[k] : (r.current_a[k] - offset_a) / (1 + gain);
   }
   return a;
@@ -43,7 +41,7 @@ std::vector<double> voltage_of(const PreparedRecording& r, const std::vector<Ins
   for (std::size_t k = 0; k < v.size(); ++k) {
     // a row that was removed, because a source was read in the place of the cell
     const bool of_cell = std::isfinite(r.voltage_v[k]);
-    const bool trusted = has_trusted(r, Channel::voltage) && std::isfinite(r.voltage_ref_v[k]);
+    const bool trusted = has_trusted(r, Check::Channel::voltage) && std::isfinite(r.voltage_ref_v[k]);
     v[k] = trusted ? r.voltage_ref_v[k] : (r.voltage_v[k] - offset_v - contact_ohm * current_a[k]) / (1 + gain);
     if (!of_cell) v[k] = std::numeric_limits<double>::quiet_NaN();
   }
@@ -107,7 +105,7 @@ Verdict verdict_of(const Diagnosis& d) {
 
 bool have_trusted_readings(const std::vector<PreparedRecording>& records) {
   return std::any_of(records.begin(), records.end(), [](const PreparedRecording& r) {
-    return has_trusted(r, Channel::current) || has_trusted(r, Channel::voltage);
+    return has_trusted(r, Check::Channel::current) || has_trusted(r, Check::Channel::voltage);
   });
 }
 
@@ -118,10 +116,10 @@ std::vector<PreparedRecording> as_trusted(const std::vector<PreparedRecording>& 
     const bool any = have_trusted_readings({r});
     if (!any) continue;
     const std::vector<double> current_a = current_of(r, errors);
-    if (has_trusted(r, Channel::voltage)) r.voltage_v = voltage_of(r, errors, current_a);
-    if (has_trusted(r, Channel::current)) r.current_a = current_a;
-    r.trusted_current = has_trusted(r, Channel::current);
-    r.trusted_voltage = has_trusted(r, Channel::voltage);
+    if (has_trusted(r, Check::Channel::voltage)) r.voltage_v = voltage_of(r, errors, current_a);
+    if (has_trusted(r, Check::Channel::current)) r.current_a = current_a;
+    r.trusted_current = has_trusted(r, Check::Channel::current);
+    r.trusted_voltage = has_trusted(r, Check::Channel::voltage);
     std::erase_if(r.checks, [&](const Check& c) { return has_trusted(r, c.channel); });
     r.current_ref_a = {};
     r.voltage_ref_v = {};
