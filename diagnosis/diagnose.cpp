@@ -172,7 +172,7 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
 /// no mechanism changes explains more are unknown. A file that lacks three is plain: whatever it lacks looks foreign as
 /// well. With healthy recordings the catalogue is judged by them.
 void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
-  const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.evidence.doubted;
+  const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.law.doubted;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
   std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {

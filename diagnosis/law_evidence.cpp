@@ -20,7 +20,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const EvidenceThresholds& evidence_limits = law_thresholds.evidence;
+constexpr const EvidenceThresholds& evidence_limits = law_thresholds.law;
 constexpr const LeapThresholds& leap_limits = law_thresholds.leaps;
 
 /// A form of a law: neighbouring columns.

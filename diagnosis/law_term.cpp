@@ -224,7 +224,7 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
   }
   const auto most =
       std::find_if(term.laws.begin(), term.laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  if (most == term.laws.end() || most->gain < law_thresholds.evidence.least) return std::nullopt;
+  if (most == term.laws.end() || most->gain < law_thresholds.law.least) return std::nullopt;
   term.law = most->law;
   term.depends_on = {most->depends_on};
   for (const TableLaw& law : table_laws) {

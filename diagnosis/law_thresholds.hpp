@@ -43,7 +43,7 @@ struct LeapThresholds {
 
 struct LawThresholds {
   TermThresholds term;
-  EvidenceThresholds evidence;
+  EvidenceThresholds law;
   LeapThresholds leaps;
 };
 
