@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "diagnosis/block_covariance.hpp"
+#include "diagnosis/credibility.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
@@ -16,81 +17,6 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
-/// Covariance of some estimated parameters, with others fixed: the resistance of a polarisation and an energy that
-/// scales it have a well-known product.
-Eigen::MatrixXd covariance_with_fixed(const HypothesisFit& f, const std::vector<Eigen::Index>& of,
-                                      const std::vector<Eigen::Index>& fixed) {
-  const Eigen::MatrixXd own = f.covariance(of, of);
-  if (fixed.empty() || !f.covariance.allFinite()) return own;
-  const Eigen::MatrixXd across = f.covariance(fixed, of);
-  return own - across.transpose() * Eigen::MatrixXd(f.covariance(fixed, fixed)).ldlt().solve(across);
-}
-
-/// Places among the estimated parameters of the mechanisms in `of`, except `mechanism`.
-std::vector<Eigen::Index> places_of(const HypothesisFit& f, const std::set<std::size_t>& of, std::size_t mechanism) {
-  const std::vector<ParameterRef> sought = f.hypothesis.sought();
-  std::vector<Eigen::Index> places;
-  for (std::size_t k = 0; k < sought.size(); ++k) {
-    const std::size_t index = f.hypothesis.settings[sought[k].setting].index;
-    if (of.contains(index) && index != mechanism) places.push_back(static_cast<Eigen::Index>(k));
-  }
-  return places;
-}
-
-/// Returns true if a mechanism's own strength does not carry it: each of its strengths, or the first one if the others
-/// mean nothing without it, is at a bound or within two of its standard deviations of none. One without a standard
-/// deviation was searched, and counts. certain: mechanisms that are there in any case, at whatever size.
-bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain = {}) {
-  const std::vector<ParameterRef> sought = f.hypothesis.sought();
-  const std::vector<Eigen::Index> fixed = places_of(f, certain, mechanism);
-  const auto sigma_of = [&](std::size_t j, double sigma) {
-    if (fixed.empty()) return sigma;
-    const auto k = static_cast<Eigen::Index>(j);
-    const double share = covariance_with_fixed(f, {k}, fixed)(0, 0) / f.covariance(k, k);
-    return std::isfinite(share) ? sigma * std::sqrt(std::clamp(share, 0.0, 1.0)) : sigma;
-  };
-  bool has_strength = false;
-  for (std::size_t j = 0; j < sought.size(); ++j) {
-    const MechanismSetting& s = f.hypothesis.settings[sought[j].setting];
-    const model::Parameter& p = model::catalogue[s.index].parameter[sought[j].parameter];
-    if (s.index != mechanism || p.role != model::Role::strength) continue;
-    if (sought[j].parameter > 0 && knowledge_of(mechanism).needs_first_strength) continue;
-    has_strength = true;
-    const double value = s.value[sought[j].parameter], sigma = sigma_of(j, s.deviation[sought[j].parameter]);
-    const bool known = std::isfinite(sigma) && sigma > 0;
-    if (f.at_bound[j] == 0 && (!known || std::abs(value) >= selection_limits.own_sigmas * sigma)) return false;
-  }
-  return has_strength;
-}
-
-/// Quantile of chi square that is `own_sigmas` of a single strength, by Wilson and Hilferty (1931).
-double chi_square_of_own_sigmas(Eigen::Index strengths) {
-  const double share = numerics.statistics.wilson_hilferty / static_cast<double>(strengths),
-               root = 1 - share + numerics.statistics.normal_of_two_sigma * std::sqrt(share);
-  return static_cast<double>(strengths) * root * root * root;
-}
-
-/// Returns true if all strengths of a mechanism together are within two standard deviations of none, with those of
-/// `certain` mechanisms fixed: of two that share an effect neither is known alone. One at a bound does not count.
-bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain) {
-  const bool weak = is_weak(f, mechanism, certain);
-  const std::vector<ParameterRef> sought = f.hypothesis.sought();
-  std::vector<Eigen::Index> own;
-  std::vector<double> value;
-  for (std::size_t k = 0; k < sought.size(); ++k) {
-    const MechanismSetting& s = f.hypothesis.settings[sought[k].setting];
-    const model::Parameter& p = model::catalogue[s.index].parameter[sought[k].parameter];
-    if (s.index != mechanism || p.role != model::Role::strength || f.at_bound[k] != 0) continue;
-    own.push_back(static_cast<Eigen::Index>(k));
-    value.push_back(s.value[sought[k].parameter]);
-  }
-  if (own.empty() || !weak) return weak;
-  const Eigen::MatrixXd covariance = covariance_with_fixed(f, own, places_of(f, certain, mechanism));
-  const Eigen::Map<const Eigen::VectorXd> strengths(value.data(), static_cast<Eigen::Index>(value.size()));
-  const double away = strengths.dot(covariance.ldlt().solve(strengths));
-  return !(away >= chi_square_of_own_sigmas(strengths.size()));  // true for NaN
-}
-
 /// Largest factor by which the variance of one of a mechanism's strengths is wider with the error of the model.
 double widening(const Hypothesis& narrow, const Hypothesis& wide, std::size_t mechanism) {
   double most = 1;
@@ -101,18 +27,6 @@ double widening(const Hypothesis& narrow, const Hypothesis& wide, std::size_t me
       most = std::max(most, is / was * (is / was));
   }
   return most;
-}
-
-/// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
-bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
-  if (mechanism != model::mechanism_index_of<model::CapacityChange>) return false;
-  const auto growth = [&](std::size_t of) {
-    const MechanismSetting* s = f.hypothesis.find(of);
-    return s == nullptr ? 0 : s->value[0];
-  };
-  return f.hypothesis.find(mechanism)->value[0] > selection_limits.capacity_lost_alone &&
-         growth(model::mechanism_index_of<model::ResistanceGrowth>) < selection_limits.resistance_grown &&
-         growth(model::mechanism_index_of<model::PolarisationGrowth>) < selection_limits.resistance_grown;
 }
 
 /// The other mechanism whose strength is correlated most with this one's; no_mechanism if none is by much.

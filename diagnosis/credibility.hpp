@@ -1,0 +1,23 @@
+// Whether a fitted mechanism may be named at all: its strength is known, and no cell contradicts it.
+#pragma once
+
+#include <cstddef>
+#include <set>
+
+#include "diagnosis/likelihood_model.hpp"
+
+namespace bms::diagnosis {
+
+/// Returns true if a mechanism's own strength does not carry it: each of its strengths, or the first one if the others
+/// mean nothing without it, is at a bound or within two of its standard deviations of none. One without a standard
+/// deviation was searched, and counts. certain: mechanisms that are there in any case, at whatever size.
+bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain);
+
+/// Returns true if all strengths of a mechanism together are within two standard deviations of none, with those of
+/// `certain` mechanisms fixed: of two that share an effect neither is known alone. One at a bound does not count.
+bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain);
+
+/// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
+bool is_implausible(const HypothesisFit& f, std::size_t mechanism);
+
+}  // namespace bms::diagnosis
