@@ -97,7 +97,9 @@ class Elimination {
   bool resume() {
     const std::size_t most = std::max<std::size_t>(found_.best.hypothesis.added().size(), 1);
     const HypothesisFit* better = nullptr;
-    for (const auto& [mechanisms, fit] : search_.best_of_each()) {
+    for (const auto& known : search_.best_of_each()) {
+      const std::vector<std::size_t>& mechanisms = known.first;
+      const HypothesisFit& fit = known.second;
       const bool allowed = std::all_of(mechanisms.begin(), mechanisms.end(), [&](std::size_t m) {
         return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
                is_credible(fit, m);
