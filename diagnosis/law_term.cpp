@@ -168,10 +168,10 @@ void learn_memory(const LikelihoodModel& likelihood, const NoiseModel& nominal, 
   const LikelihoodModel plain = likelihood_with(likelihood, nominal, {});
   if (plain.base().find(memory) != nullptr) return;
   plain.linearise(plain.base(), plain.unchanged());  // which the fits share
-  std::array<std::optional<HypothesisFit>, term_limits.memory_s.size()> fits;
+  std::array<std::optional<HypothesisFit>, law_thresholds.law.slow_s.size()> fits;
   measurement::in_parallel(fits.size(), [&](std::size_t k) {
     MechanismSetting start = model::default_setting(memory, plain.cell());
-    start.value[time_constant] = term_limits.memory_s[k];
+    start.value[time_constant] = law_thresholds.law.slow_s[k];
     fits[k] = plain.fit(with(plain.base(), start));
   });
   HypothesisFit& fit =

@@ -16,7 +16,6 @@ struct TermThresholds {
   double error_left = 0.8;       ///< share of the error on what was left out, below which a term pays
   double improves_sigmas = 1.5;  ///< mean improvement of the blocks left out over its standard deviation, at least
   double as_good = 1.02;         ///< of the least error, within which the smaller factor is taken
-  std::array<double, 3> memory_s = {250, 1'000, 4'000};  ///< [s] time constants from which a memory of the load begins
 };
 
 /// The evidence of a law (law_evidence.hpp).
@@ -25,8 +24,9 @@ struct EvidenceThresholds {
   std::size_t doubted = 2;  ///< so many causes, named without healthy recordings, are doubted: a file that lacks more
                             ///< is plain, and whatever it lacks looks foreign as well
   double narrowest = 1.0 / 64, widest = 4;  ///< prior of a law's columns, times the free error
-  std::array<double, 3> fast_s = {4, 15, 60}, slow_s = {250, 1'000, 4'000};  ///< [s] time constants of the load before
-  std::size_t late_rows = 2;                                                 ///< lateness of a channel that is tried
+  /// [s] time constants of the load before; a memory of the load is fitted from the slow ones.
+  std::array<double, 3> fast_s = {4, 15, 60}, slow_s = {250, 1'000, 4'000};
+  std::size_t late_rows = 2;           ///< lateness of a channel that is tried
   double middle_c = 25, swing_k = 10;  ///< temperature at which nothing changes, and a usual distance from it
   double ahead_soc = 0.05;             ///< by which a part of the cell is ahead
   double slope_soc = 0.002;            ///< for the slope of the OCV
