@@ -300,6 +300,18 @@ TEST(Diagnose, WhenStoppedItSaysWhatIsKnownSoFar) {
   EXPECT_THAT(ids_of(some), Contains("resistance_growth"));
 }
 
+/// Next to a misfit that is tolerated: as a fault grows, it is first tolerated as well, then named.
+TEST(Diagnose, AFaintCauseThatExplainsWhatIsNotTolerated) {
+  for (const double ohm : {0.0008, 0.00083, 0.00086, 0.0009, 0.0012}) {
+    const Diagnosis d =
+        diagnose(test::table9(), {},
+                 {test::recorded(test::drive(2, 12), 0.7, 12, [ohm](std::size_t k, double current_a, double) {
+                   return ohm * current_a + 0.002 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 1'234);
+                 })});
+    EXPECT_NE(d.verdict, Verdict::unknown) << ohm << ", left " << d.remaining;
+  }
+}
+
 TEST(Diagnose, ToleranceIsWidenedUntilOwnRecordingsShowNothing) {
   const auto residual_of = [](double v) {
     return test::recorded(test::drive(2, 33), 0.7, 33, [v](std::size_t k, double, double) {
