@@ -23,8 +23,13 @@ double share_of_misfit(const Adequacy& a, double gain_of_checks) {
   return gain + a.residual.gain > 0 ? gain / (gain + a.residual.gain) : 1;
 }
 
+/// Returns true if the residual has something that noise does not have.
+bool is_unusual(const Adequacy& a) {
+  return a.residual.gain > adequacy_limits.unexplained || a.residual.far_out > adequacy_limits.far_out;
+}
+
 bool is_unknown(const Adequacy& a, const Hypothesis& best) {
-  if (a.residual.gain <= adequacy_limits.unexplained && a.residual.far_out <= adequacy_limits.far_out) return false;
+  if (!is_unusual(a)) return false;
   // what is flexible gains on anything: if it is named, its residual must be white
   const double enough =
       best.find(Signature::contact_bursts) != nullptr ? adequacy_limits.explained_by_bursts : adequacy_limits.explained;
@@ -41,12 +46,15 @@ Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const Hyp
                       best_fit = likelihood.fit(survivors.best.hypothesis, survivors.best.calibration, iterations);
   Adequacy a{control_fit.cost, best_fit.cost, test_residual(likelihood, best_fit)};
   a.explained = share_of_misfit(a, of_checks(likelihood, control_fit) - of_checks(likelihood, best_fit));
-  // what explains little, and that incompletely, is not a cause
+  // what explains little, and that incompletely, is not a cause, unless nothing else makes the recording explained
   if (!survivors.best.hypothesis.added().empty() && gained(a) < thresholds.decision.faint &&
       a.explained < adequacy_limits.explained) {
-    survivors = {control, {}, {}, {}};
-    a = {control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
-    a.explained = share_of_misfit(a, 0);
+    Adequacy without{control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
+    without.explained = share_of_misfit(without, 0);
+    if (is_unusual(a) || !is_unusual(without)) {
+      survivors = {control, {}, {}, {}};
+      a = without;
+    }
   }
   likelihood.set_noise(survivors.best.noise);
   a.found = !survivors.best.hypothesis.added().empty();

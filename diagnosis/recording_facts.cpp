@@ -106,7 +106,7 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
   facts.reference_c = cell.reference_temperature_c;
   Range soc, read_a, temperature_c;
   std::set<int> rates;
-  std::vector<double> steps_s;
+  std::vector<double> steps_s, away_k;
   facts.trusted_current = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_current; });
   facts.trusted_voltage = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_voltage; });
   for (const PreparedRecording& r : records) {
@@ -127,9 +127,11 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
       if (!std::isfinite(c)) continue;
       temperature_c.add(c);
       facts.temperature = true;
-      facts.away_k = std::max(facts.away_k, std::abs(c - facts.reference_c));
+      away_k.push_back(std::abs(c - facts.reference_c));
+      facts.away_k = std::max(facts.away_k, away_k.back());
     }
   }
+  if (!away_k.empty()) facts.mostly_away_k = measurement::upper_median(away_k);
   if (!steps_s.empty()) facts.step_s = measurement::upper_median(steps_s);
   facts.soc_span = soc.span();
   facts.read_span_a = read_a.span();

@@ -29,6 +29,7 @@ struct RecordingFacts {
   bool temperature = false;       ///< was recorded
   double temperature_span_k = 0;  ///< 0: not recorded, or constant
   double away_k = 0;              ///< largest distance from reference_c; 0: not recorded
+  double mostly_away_k = 0;       ///< its median
   double longest_rest_s = 0;
   std::size_t reversals = 0;                              ///< turns of the charge's direction
   std::size_t rates = 0;                                  ///< sizes of current

@@ -92,18 +92,19 @@ class Elimination {
     return true;
   }
 
-  /// Returns true if something as simple that was fitted on the way is better by what is needed to be found, and
-  /// credible: what was dropped last had taken its place. That has become the best.
+  /// Returns true if something as simple that was fitted on the way is better by what is needed to be found, credible,
+  /// and has what is certain: what was dropped last had taken its place. That has become the best.
   bool resume() {
     const std::size_t most = std::max<std::size_t>(found_.best.hypothesis.added().size(), 1);
     const HypothesisFit* better = nullptr;
     for (const auto& known : search_.best_of_each()) {
       const std::vector<std::size_t>& mechanisms = known.first;
       const HypothesisFit& fit = known.second;
-      const bool allowed = std::all_of(mechanisms.begin(), mechanisms.end(), [&](std::size_t m) {
-        return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
-               is_credible(fit, m);
-      });
+      const bool allowed =
+          keeps_certain(fit) && std::all_of(mechanisms.begin(), mechanisms.end(), [&](std::size_t m) {
+            return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
+                   is_credible(fit, m);
+          });
       const double needed = search_.score(better != nullptr ? *better : found_.best) -
                             (better != nullptr ? 0 : selection_limits.detected);
       if (allowed && mechanisms.size() <= most && search_.score(fit) < needed) better = &fit;
@@ -128,6 +129,13 @@ class Elimination {
   }
 
  private:
+  /// Returns true if it has what is certain in most of the recording and the best has.
+  bool keeps_certain(const HypothesisFit& f) const {
+    return std::all_of(scope_.kept.begin(), scope_.kept.end(), [&](std::size_t m) {
+      return found_.best.hypothesis.find(m) == nullptr || f.hypothesis.find(m) != nullptr;
+    });
+  }
+
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
     return scope_.expected.contains(m) || (!is_weak(f, m, scope_.expected) && !is_implausible(f, m));
@@ -241,12 +249,15 @@ class Elimination {
 Scope scope_of(const LikelihoodModel& likelihood) {
   Scope scope;
   const Hypothesis base = likelihood.base();
+  RecordingFacts mostly = likelihood.facts();
+  mostly.away_k = mostly.mostly_away_k;
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
     if (knowledge_of(m).only_a_term) continue;
     if (const auto reason = not_testable(likelihood, base, m)) scope.not_testable.push_back({m, *reason});
     if (base.find(m) != nullptr) continue;
     scope.searched.push_back(m);
     if (knowledge_of(m).expected(likelihood.cell(), likelihood.facts())) scope.expected.insert(m);
+    if (knowledge_of(m).expected(likelihood.cell(), mostly)) scope.kept.insert(m);
   }
   return scope;
 }

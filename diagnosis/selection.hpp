@@ -19,6 +19,7 @@ struct Scope {
   std::vector<std::size_t> searched;  ///< all but the cell file's own; the screen leaves out what cannot be tested
   std::set<std::size_t> expected;     ///< certain before any voltage is looked at: fitted before anything that could
                                       ///< take its place
+  std::set<std::size_t> kept;         ///< of these, certain in most of the recording: no set without takes their place
   std::vector<NotTestable> not_testable;
 };
 Scope scope_of(const LikelihoodModel& likelihood);
