@@ -48,8 +48,9 @@ Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const Hyp
     a = {control_fit.cost, control_fit.cost, test_residual(likelihood, control_fit)};
     a.explained = share_of_misfit(a, 0);
   }
-  likelihood.set_noise(survivors.best.noise);
   a.found = !survivors.best.hypothesis.added().empty();
+  if (a.found) a.only_place = only_place(likelihood, control_fit, best_fit);
+  likelihood.set_noise(survivors.best.noise);
   a.unknown = is_unknown(a, survivors.best.hypothesis);
   return a;
 }

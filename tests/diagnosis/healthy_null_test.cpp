@@ -54,6 +54,13 @@ TEST(HealthyNull, ACauseThatHealthyRecordingsNeverShowNeedsLess) {
   EXPECT_FALSE(null.compare("channel_skew", 30).stands_out) << "some other cause reaches as much by chance";
 }
 
+TEST(HealthyNull, WithoutAnyTheHoursDependOnTheGain) {
+  EXPECT_EQ(hours_if_none_shows_any(1e6, 1, 0.01), 2);
+  EXPECT_GT(hours_if_none_shows_any(100, 1, 0.01), 3);
+  EXPECT_EQ(hours_if_none_shows_any(30, 1, 0.01), 99) << "by rank alone";
+  EXPECT_DOUBLE_EQ(hours_if_none_shows_any(1e6, 0.5, 0.01), 1);
+}
+
 TEST(HealthyNull, WithFewBlocksItSaysHowManyHoursWouldDo) {
   const HealthyNull few(blocks_of_offset({300, 200, 400}), 0.01, 3'600);
   EXPECT_TRUE(few.compare("voltage_offset", 6'000).stands_out);
