@@ -54,6 +54,19 @@ TEST(HealthyNull, ACauseThatHealthyRecordingsNeverShowNeedsLess) {
   EXPECT_FALSE(null.compare("channel_skew", 30).stands_out) << "some other cause reaches as much by chance";
 }
 
+TEST(HealthyNull, AnUnknownCauseNextToAWithheldOneNamesThatOne) {
+  Diagnosis d;
+  d.verdict = Verdict::unknown;
+  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("none of the known causes"));
+  Withheld w;
+  w.mechanism = model::mechanism_index("polarisation_growth");
+  w.healthy.hours_needed = 3;
+  d.healthy = HealthyBasis{.hours = 0.5};
+  d.withheld = {w};
+  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("polarisation is not named as its cause: 0.5 h of healthy"));
+  EXPECT_THAT(statement(d, {}), ::testing::Not(::testing::HasSubstr("none of the known causes")));
+}
+
 TEST(HealthyNull, WithoutAnyTheHoursDependOnTheGain) {
   EXPECT_EQ(hours_if_none_shows_any(1e6, 1, 0.01), 2);
   EXPECT_GT(hours_if_none_shows_any(100, 1, 0.01), 3);
