@@ -62,8 +62,8 @@ def identified(tool, data, folder, name, left_out, with_slow_runs=False):
            for way in ("chg", "dis")]
     drives = [data / name / f"{drive}.csv" for t, drive in a_set["drives"].items() if t != left_out]
     more = [data / name / f"{m}.csv" for t, names in a_set["more"].items() if t != left_out for m in names]
-    run(tool, "identify", "--extend", "--ocv", *ocv, "--recording", *drives, *more, "--start", "a123_26650", "--name",
-        cell.stem, "--out", cell, "--quiet")
+    run(tool, "identify", "--extend", "--no-healthy", "--ocv", *ocv, "--recording", *drives, *more, "--start",
+        "a123_26650", "--name", cell.stem, "--out", cell, "--quiet")
     return cell
 
 

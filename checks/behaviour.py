@@ -106,7 +106,7 @@ def items_of(o):
         "identify": {
             "forklift_shift": [f"{identify} {shift} --window 0.9:0.6 --validate {shift} --validate-window 0.6:0.3"],
             "pulse --extend": [f"{identify} {pulse} --ocv {discharge} {charge} --start a123_26650 --window 0.95:0.1"
-                               f" --extend --validate {udds}"]},
+                               f" --extend --no-healthy --validate {udds}"]},
         "diagnose": {
             "forklift_shift": [f"{diagnose} table9 --initial-soc 0.98 --recording {shift}"],
             "udds, hold-out dyn20": [f"{diagnose} a123_26650 --recording {udds} --holdout {dyn20}"],

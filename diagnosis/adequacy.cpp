@@ -56,8 +56,9 @@ Adequacy judge(LikelihoodModel& likelihood, const NoiseModel& nominal, const Hyp
       a = without;
     }
   }
-  likelihood.set_noise(survivors.best.noise);
   a.found = !survivors.best.hypothesis.added().empty();
+  if (a.found) a.only_place = only_place(likelihood, control_fit, best_fit);
+  likelihood.set_noise(survivors.best.noise);
   a.unknown = is_unknown(a, survivors.best.hypothesis);
   return a;
 }

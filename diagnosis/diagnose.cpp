@@ -14,6 +14,7 @@
 #include "diagnosis/locate.hpp"
 #include "diagnosis/one_by_one.hpp"
 #include "diagnosis/one_current.hpp"
+#include "diagnosis/one_place.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/profile.hpp"
 #include "diagnosis/screen.hpp"
@@ -103,8 +104,8 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
   const std::vector<Finding>& findings = d.findings;
   if (adequacy.unknown) return Verdict::unknown;
   // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
-  const bool covered =
-      std::none_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.not_covered; });
+  const bool covered = std::none_of(d.withheld.begin(), d.withheld.end(),
+                                    [](const Withheld& w) { return w.not_covered || w.only_place; });
   if (!adequacy.found && covered && errors.file_v > errors.gross_v) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
   if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
@@ -217,6 +218,13 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
+  if (adequacy.only_place && !judge_healthy && !options.learns) {
+    d.withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains,
+                             options.false_alarm_rate);
+    survivors = {control, {}, {}, {}};
+    adequacy.found = adequacy.unknown = false;
+    likelihood.set_noise(control.noise);
+  }
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   d.unknown_gain = unknown_gain(adequacy.residual);
   if (options.learns && adequacy.found)

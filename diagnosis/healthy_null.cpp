@@ -51,7 +51,17 @@ std::vector<double> largest_log_ratios(const std::vector<measurement::HealthyBlo
   return largest;
 }
 
+/// Blocks above which the rank alone is enough.
+double most_blocks(double rate) { return std::ceil(1 / rate) - 1; }
+
 }  // namespace
+
+double hours_if_none_shows_any(double gain, double duration_h, double rate) {
+  const double deviations = std::log1p(std::max(gain, 0.0) / thresholds.decision.detected) / healthy_limits.log_spread;
+  double blocks = healthy_limits.blocks_at_least;
+  while (blocks < most_blocks(rate) && predictive_tail(deviations, blocks) > rate) ++blocks;
+  return blocks * duration_h;
+}
 
 HealthyNull::HealthyNull(const measurement::HealthyData& healthy, double rate, double duration_s)
     : blocks_(healthy.blocks), rate_(rate), hours_(healthy.hours()) {
@@ -95,7 +105,7 @@ HealthyComparison HealthyNull::compare(const std::string& cause, double gain) co
   c.stands_out = c.false_alarm <= rate_;
   if (c.stands_out || as_extreme > 0 || (n > 0 && gain <= c.healthy_gain)) return c;
   // by rank alone, unless fewer blocks like these would do
-  double needed = std::ceil(1 / rate_) - 1;
+  double needed = most_blocks(rate_);
   for (double more = std::max(n, healthy_limits.blocks_at_least); n > 0 && more < needed; ++more) {
     if (predictive_tail((ratio - mean_) / spread_, more) <= rate_) needed = more;
   }

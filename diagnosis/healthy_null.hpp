@@ -24,6 +24,10 @@ struct HealthyComparison {
   std::optional<double> hours_needed;
 };
 
+/// Healthy recordings [h], each as long as duration_h, that would let a cause of this gain stand out if they
+/// showed nothing of it.
+double hours_if_none_shows_any(double gain, double duration_h, double rate);
+
 class HealthyNull {
  public:
   /// rate: of false alarms, 0 < rate < 1. duration_s: of the recordings to be diagnosed; gain grows with it.

@@ -164,6 +164,12 @@ std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {
   std::string text =
       fmt::format("The recording differs from the model by {} in a way that none of the known causes explains.",
                   millivolts(facts.error_v));
+  const auto cause =
+      std::find_if(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.mechanism != no_mechanism; });
+  if (cause != d.withheld.end())
+    text = fmt::format("The recording differs from the model by {}. {} is not named as its cause: {}.",
+                       millivolts(facts.error_v), capitalised(std::string(text_of_mechanism(cause->mechanism).name)),
+                       reason_of(*cause, d.healthy.value_or(HealthyBasis{})));
   if (!where.empty()) text += " Most of the difference lies " + where + ".";
   if (d.law) {
     text += fmt::format(" It acts on {}.", name_of_law(*d.law));

@@ -89,6 +89,8 @@ struct Withheld {
   double gain = 0;
   HealthyComparison healthy;
   bool not_covered = false;  ///< the recordings go where the healthy ones did not
+  /// All that speaks for it lies here, and there are no healthy recordings.
+  std::optional<model::Span> only_place = std::nullopt;
 };
 
 /// The healthy data that a diagnosis was compared with.

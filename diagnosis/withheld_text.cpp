@@ -20,6 +20,11 @@ std::string name_of(const Withheld& w) {
 }  // namespace
 
 std::string reason_of(const Withheld& w, const HealthyBasis& healthy) {
+  if (w.only_place)
+    return fmt::format(
+        "all that speaks for {} lies between {:.0f} and {:.0f} s, and no healthy recording of this cell says how wrong "
+        "the model is there; about {} of them would decide",
+        name_of(w), w.only_place->start_s, w.only_place->end_s, hours_text(w.healthy.hours_needed.value_or(0)));
   if (w.not_covered)
     return fmt::format(
         "only {:.0f} % of the recording lies at states of charge, temperatures and currents of the healthy "
@@ -45,7 +50,7 @@ std::string withheld_text(const Diagnosis& d, const std::string& error) {
                                  : "Add healthy recordings of this cell (bms identify --healthy).";
   return fmt::format(
       "Not enough healthy data to blame anything: {}. {} Without a comparison {} would have been named. {}",
-      reason_of(*undecided, *d.healthy), error, name_of(*undecided), action);
+      reason_of(*undecided, d.healthy.value_or(HealthyBasis{})), error, name_of(*undecided), action);
 }
 
 std::string also_withheld_text(const Diagnosis& d) {

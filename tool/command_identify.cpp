@@ -85,12 +85,21 @@ std::string grey_box_summary(const id::Identification& found) {
   return text;
 }
 
-std::string summary(const workflow::IdentifyResult& result) {
+/// What the cell file knows of the healthy cell. learned_unasked: from the recordings that it was identified from.
+std::string healthy_text(const files::CellFile& cell, bool learned_unasked) {
+  if (!cell.healthy.known)
+    return "No healthy data: bms diagnose names what this model lacks of a healthy cell as well (--healthy).\n";
+  const std::string learned =
+      cell.healthy.blocks.empty() ? "none that can be used" : workflow::healthy_summary(cell.healthy);
+  return "Healthy data: " + learned +
+         (learned_unasked ? ". The recordings were taken for those of a healthy cell; if not: --no-healthy.\n" : ".\n");
+}
+
+std::string summary(const workflow::IdentifyResult& result, bool learned_unasked) {
   std::string text = result.joint ? joint_summary(*result.joint) : grey_box_summary(result.identification);
   for (const auto& [path, fit] : result.validations)
     text += fmt::format("Validated on {}: {:.2f} mV RMS, fit {:.1f} %.\n", path, 1e3 * fit.rmse_v, fit.fit_percent);
-  if (result.cell_file && !result.cell_file->healthy.blocks.empty())
-    text += "Healthy data: " + workflow::healthy_summary(result.cell_file->healthy) + ".\n";
+  if (result.cell_file) text += healthy_text(*result.cell_file, learned_unasked);
   return text + (result.cell.empty() ? "No cell file was written." : "Cell file: " + result.out);
 }
 
@@ -188,7 +197,7 @@ class IdentifyCommand final : public Command {
     for (const measurement::Warning& w : result.warnings) warn(w.text);
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
     if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result));
-    print_summary(output_, summary(result));
+    print_summary(output_, summary(result, learns_unasked_));
     return result.cell_file ? 0 : 1;
   }
 
@@ -263,8 +272,12 @@ class IdentifyCommand final : public Command {
     c.add_option(
          "--healthy", o_.healthy,
          "recordings of the healthy cell, also those of --recording: what the model leaves unexplained of each, "
-         "identified without it, goes into the cell file, and bms diagnose blames nothing for as much")
+         "identified without it, goes into the cell file, and bms diagnose blames nothing for as much; with --extend "
+         "those of --recording if not given")
         ->type_name("FILE");
+    c.add_flag("--no-healthy", no_healthy_,
+               "with --extend: do not learn from the recordings what it leaves unexplained")
+        ->excludes("--healthy");
     c.add_option("--hold-out", o_.hold_out,
                  "with --extend: recordings whose prediction is reported; nothing is identified from them")
         ->needs("--extend")
@@ -285,11 +298,15 @@ class IdentifyCommand final : public Command {
     if (!texts_.validate_window.empty())
       o_.validate_window = workflow::window_of("--validate-window", texts_.validate_window);
     if (o_.name.empty()) o_.name = std::filesystem::path(o_.out).stem().string();
+    // without --extend the file lacks physics that a diagnosis is there to name: nothing of it is taken for healthy
+    learns_unasked_ = o_.extend && o_.healthy.empty() && !no_healthy_;
+    if (learns_unasked_) o_.healthy = o_.recordings;
   }
 
   workflow::IdentifyOptions o_;
   IdentifyTexts texts_;
-  bool each_cell_ = false;
+  bool each_cell_ = false, no_healthy_ = false;
+  bool learns_unasked_ = false;  ///< [healthy] from the recordings themselves
   Output output_;
 };
 

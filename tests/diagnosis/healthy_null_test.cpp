@@ -54,6 +54,26 @@ TEST(HealthyNull, ACauseThatHealthyRecordingsNeverShowNeedsLess) {
   EXPECT_FALSE(null.compare("channel_skew", 30).stands_out) << "some other cause reaches as much by chance";
 }
 
+TEST(HealthyNull, AnUnknownCauseNextToAWithheldOneNamesThatOne) {
+  Diagnosis d;
+  d.verdict = Verdict::unknown;
+  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("none of the known causes"));
+  Withheld w;
+  w.mechanism = model::mechanism_index("polarisation_growth");
+  w.healthy.hours_needed = 3;
+  d.healthy = HealthyBasis{.hours = 0.5};
+  d.withheld = {w};
+  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("polarisation is not named as its cause: 0.5 h of healthy"));
+  EXPECT_THAT(statement(d, {}), ::testing::Not(::testing::HasSubstr("none of the known causes")));
+}
+
+TEST(HealthyNull, WithoutAnyTheHoursDependOnTheGain) {
+  EXPECT_EQ(hours_if_none_shows_any(1e6, 1, 0.01), 2);
+  EXPECT_GT(hours_if_none_shows_any(100, 1, 0.01), 3);
+  EXPECT_EQ(hours_if_none_shows_any(30, 1, 0.01), 99) << "by rank alone";
+  EXPECT_DOUBLE_EQ(hours_if_none_shows_any(1e6, 0.5, 0.01), 1);
+}
+
 TEST(HealthyNull, WithFewBlocksItSaysHowManyHoursWouldDo) {
   const HealthyNull few(blocks_of_offset({300, 200, 400}), 0.01, 3'600);
   EXPECT_TRUE(few.compare("voltage_offset", 6'000).stands_out);

@@ -176,7 +176,8 @@ TEST_F(IdentifyTool, ReproducesABuiltInExtendedCell) {
   };
   const std::filesystem::path other = data / "a123_esctoolbox";
   const auto made = [&](const std::string& what) {
-    const ToolRun run = run_tool("identify --extend --start a123_26650 " + what + " --out " + path("made.toml"));
+    const ToolRun run =
+        run_tool("identify --extend --no-healthy --start a123_26650 " + what + " --out " + path("made.toml"));
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return values_of(content(path("made.toml")));
   };
@@ -230,7 +231,7 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   const std::string warm = recording_at(folder_.path().string(), 18.5),
                     cold = recording_at(folder_.path().string(), -10);
   const std::string recordings = "--recording " + warm + " " + cold + " --initial-soc 0.6 --nodes 0.5 ";
-  result(recordings + "--extend --reference-temperature 20");
+  result(recordings + "--extend --no-healthy --reference-temperature 20");
   const std::string cell = content(path("cell.toml"));
   EXPECT_THAT(cell, HasSubstr("\nreference_temperature_c = 20.0\n"));
   EXPECT_THAT(cell, HasSubstr("\nreference_c = 20.0\n"));
@@ -255,6 +256,24 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   const json far = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5");
   EXPECT_THAT(content(path("cell.toml")), Not(HasSubstr("reference_temperature_c")));
   EXPECT_THAT(far["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
+}
+
+TEST_F(IdentifyTool, AnExtendedFileLearnsWhatItLeavesUnexplainedOfItsOwnRecordings) {
+  const std::string drive = recording_at(folder_.path().string(), 25),
+                    from = "--recording " + drive + " --initial-soc 0.6 --nodes 0.5 ";
+  EXPECT_GT(result(from + "--extend")["healthy"]["blocks"], 3) << "a drive of an hour and a half, in blocks";
+  const std::string own = content(path("cell.toml"));
+  EXPECT_GT(result(from + "--extend --healthy " + drive)["healthy"]["blocks"], 3);
+  EXPECT_EQ(own, content(path("cell.toml"))) << "as with --healthy and the same files";
+
+  // a plain file is there to have the physics named that it lacks
+  for (const char* without : {"--extend --no-healthy", ""}) {
+    EXPECT_EQ(result(from + without)["healthy"]["blocks"], 0) << without;
+    EXPECT_THAT(content(path("cell.toml")), Not(HasSubstr("[healthy]"))) << without;
+  }
+  EXPECT_EQ(
+      run_tool("identify " + from + "--extend --no-healthy --healthy " + drive + " --out " + path("c.toml")).exit_code,
+      2);
 }
 
 TEST_F(IdentifyTool, TheGeneratedHeaderHasTheReferenceTemperature) {

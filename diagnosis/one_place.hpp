@@ -1,0 +1,33 @@
+// Whether all that speaks for a hypothesis lies in one place of the recordings.
+//
+// A cell file's tolerance is that of its tables. At the end of a discharge, or after the load, any model is off by
+// more, and some mechanism always fits one such place. A fault acts wherever its current flows. Without healthy
+// recordings of the cell nothing says how wrong the model is there.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "diagnosis/likelihood_model.hpp"
+#include "diagnosis/verdict.hpp"
+
+namespace bms::diagnosis {
+
+/// Rows of a record.
+struct PlaceOfGain {
+  std::size_t record = 0, first = 0, count = 0;
+};
+
+/// The place from which a fit has most of its gain over `control`, if the rest of the recordings would not be enough to
+/// name anything. Nothing for a contact that goes and comes back while the same current flows. Both fits with the
+/// likelihood's noise model.
+std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
+                                      const HypothesisFit& fit);
+
+/// What a hypothesis adds, not to be named because of its only place. gains: by mechanism.
+std::vector<Withheld> withheld_at(const LikelihoodModel& likelihood, const PlaceOfGain& place, const Hypothesis& h,
+                                  const std::map<std::size_t, double>& gains, double false_alarm_rate);
+
+}  // namespace bms::diagnosis
