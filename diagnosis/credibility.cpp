@@ -97,4 +97,9 @@ bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
          growth(model::mechanism_index_of<model::PolarisationGrowth>) < credible_limits.resistance_grown;
 }
 
+bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step_s) {
+  return mechanism == model::mechanism_index_of<model::ChannelSkew> &&
+         std::abs(f.hypothesis.find(mechanism)->value[0]) < thresholds.noise.edge_jitter * step_s;
+}
+
 }  // namespace bms::diagnosis

@@ -20,4 +20,8 @@ bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<
 /// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was.
 bool is_implausible(const HypothesisFit& f, std::size_t mechanism);
 
+/// Returns true for a skew of less than what the noise model grants each reading next to an edge of the current
+/// (thresholds.noise.edge_jitter). step_s: between rows.
+bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step_s);
+
 }  // namespace bms::diagnosis
