@@ -48,14 +48,13 @@ Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const Hypoth
   Eigen::Index first = 0;
   double blocks = 0;
   for (const PreparedRecording& r : likelihood.records()) {
-    const auto rows = static_cast<Eigen::Index>(r.size());
-    for (Eigen::Index b = 0; b < covariance_blocks; ++b) {
-      const Eigen::Index from = first + rows * b / covariance_blocks, to = first + rows * (b + 1) / covariance_blocks;
+    for_each_block(r.size(), [&](Eigen::Index from, Eigen::Index count) {
       ++blocks;
-      const Eigen::VectorXd pull = own.middleRows(from, to - from).transpose() * fit.residual.segment(from, to - from);
+      const Eigen::VectorXd pull =
+          own.middleRows(first + from, count).transpose() * fit.residual.segment(first + from, count);
       pulls += pull * pull.transpose();
-    }
-    first += rows;
+    });
+    first += static_cast<Eigen::Index>(r.size());
   }
   // the prior of the base parameters pulls as it is assumed to
   Eigen::MatrixXd all = blocks / (blocks - 1) * pulls + follow.transpose() * follow;

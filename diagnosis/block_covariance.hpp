@@ -14,6 +14,16 @@ namespace bms::diagnosis {
 /// Blocks of a recording: each lasts many times a pull, and there are enough to know their spread to a quarter.
 inline constexpr Eigen::Index covariance_blocks = 12;
 
+/// block(first, count) for the rows of each block of a recording, within the recording.
+template <class Block>
+void for_each_block(std::size_t size, Block&& block) {
+  const auto rows = static_cast<Eigen::Index>(size);
+  for (Eigen::Index b = 0; b < covariance_blocks; ++b) {
+    const Eigen::Index first = rows * b / covariance_blocks;
+    block(first, rows * (b + 1) / covariance_blocks - first);
+  }
+}
+
 /// Covariance of the estimated parameters of a fit, the base parameters marginalised, from the pulls of equal blocks of
 /// time in each recording. The likelihood has the noise model of the fit.
 Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit);

@@ -48,17 +48,16 @@ std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const H
   PlaceOfGain place;
   Eigen::Index before = 0;
   for (std::size_t r = 0; r < likelihood.records().size(); ++r) {
-    const auto rows = static_cast<Eigen::Index>(likelihood.records()[r].size());
-    for (Eigen::Index b = 0; b < covariance_blocks; ++b) {
-      const Eigen::Index first = rows * b / covariance_blocks, count = rows * (b + 1) / covariance_blocks - first;
+    const std::size_t rows = likelihood.records()[r].size();
+    for_each_block(rows, [&](Eigen::Index first, Eigen::Index count) {
       const double gain = control.residual.segment(before + first, count).squaredNorm() -
                           fit.residual.segment(before + first, count).squaredNorm();
       total += gain;
-      if (gain <= most) continue;
+      if (gain <= most) return;
       most = gain;
       place = {r, static_cast<std::size_t>(first), static_cast<std::size_t>(count)};
-    }
-    before += rows;
+    });
+    before += static_cast<Eigen::Index>(rows);
   }
   if (most <= thresholds.decision.in_one_place * total) return std::nullopt;
   // base parameters that need not bend any more have no place: their part goes with what is explained where

@@ -169,7 +169,7 @@ std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {
   if (cause != d.withheld.end())
     text = fmt::format("The recording differs from the model by {}. {} is not named as its cause: {}.",
                        millivolts(facts.error_v), capitalised(std::string(text_of_mechanism(cause->mechanism).name)),
-                       reason_of(*cause, d.healthy.value_or(HealthyBasis{})));
+                       reason_of(*cause, d));
   if (!where.empty()) text += " Most of the difference lies " + where + ".";
   if (d.law) {
     text += fmt::format(" It acts on {}.", name_of_law(*d.law));

@@ -19,7 +19,8 @@ std::string name_of(const Withheld& w) {
 
 }  // namespace
 
-std::string reason_of(const Withheld& w, const HealthyBasis& healthy) {
+std::string reason_of(const Withheld& w, const Diagnosis& of) {
+  const HealthyBasis healthy = of.healthy.value_or(HealthyBasis{});
   if (w.only_place)
     return fmt::format(
         "all that speaks for {} lies between {:.0f} and {:.0f} s, and no healthy recording of this cell says how wrong "
@@ -50,7 +51,7 @@ std::string withheld_text(const Diagnosis& d, const std::string& error) {
                                  : "Add healthy recordings of this cell (bms identify --healthy).";
   return fmt::format(
       "Not enough healthy data to blame anything: {}. {} Without a comparison {} would have been named. {}",
-      reason_of(*undecided, d.healthy.value_or(HealthyBasis{})), error, name_of(*undecided), action);
+      reason_of(*undecided, d), error, name_of(*undecided), action);
 }
 
 std::string also_withheld_text(const Diagnosis& d) {

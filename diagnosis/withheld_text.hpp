@@ -8,7 +8,7 @@
 namespace bms::diagnosis {
 
 /// Why one cause was not named: "healthy recordings show as much".
-std::string reason_of(const Withheld& withheld, const HealthyBasis& healthy);
+std::string reason_of(const Withheld& withheld, const Diagnosis& of);
 
 /// What would have been named, why it is not, and what to do. error: "The model is off by 18.6 mV."
 std::string withheld_text(const Diagnosis& diagnosis, const std::string& error);

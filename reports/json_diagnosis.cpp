@@ -141,7 +141,7 @@ Json withheld_of(const diagnosis::Diagnosis& d) {
                     {"healthy_gain", number(w.healthy.healthy_gain)},
                     {"false_alarm", number(w.healthy.false_alarm)},
                     {"hours_needed", needed ? number(*needed) : Json(nullptr)},
-                    {"reason", reason_of(w, d.healthy.value_or(diagnosis::HealthyBasis{}))}});
+                    {"reason", reason_of(w, d)}});
   }
   return list;
 }
