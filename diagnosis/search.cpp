@@ -76,6 +76,43 @@ HypothesisFit own_noise_fit(LikelihoodModel& likelihood, const NoiseModel& nomin
   return f;
 }
 
+/// -2 log posterior with the noise model that the residual makes most probable, at its price.
+double total(const LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& f) {
+  double cost = 0;
+  if (f.likeliest_cost)
+    cost = *f.likeliest_cost;
+  else
+    likelihood.likeliest_noise(likelihood.raw_residual(f.hypothesis, f.calibration), nominal, cost);
+  return cost + f.cost - f.residual.squaredNorm();
+}
+
+/// Fitted on until nothing is gained any more, each time with base parameters' derivatives from where it stands.
+HypothesisFit fitted_on(LikelihoodModel& likelihood, const NoiseModel& nominal, HypothesisFit f) {
+  double sum = total(likelihood, nominal, f);
+  for (int round = 0; round < search_numerics.converged_rounds; ++round) {
+    likelihood.set_noise(f.noise);
+    likelihood.linearise(f.hypothesis, f.calibration);
+    HypothesisFit next = own_noise_fit(likelihood, nominal, likelihood.fit(f.hypothesis, f.calibration));
+    const double next_sum = total(likelihood, nominal, next), gained = sum - next_sum;
+    if (!(gained > 0)) break;
+    f = std::move(next);
+    sum = next_sum;
+    if (gained < search_numerics.converged) break;
+  }
+  return f;
+}
+
+/// The rest of a fit without a mechanism, fitted again from where it was. The model has the fit's noise.
+HypothesisFit fitted_without(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& f,
+                             std::size_t mechanism) {
+  HypothesisFit rest =
+      own_noise_fit(likelihood, nominal,
+                    likelihood.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations));
+  // where it decides whether the mechanism is needed, as far as the best was
+  const bool close = total(likelihood, nominal, rest) < total(likelihood, nominal, f) + search_limits.hopeless;
+  return close ? fitted_on(likelihood, nominal, std::move(rest)) : rest;
+}
+
 double& onset_of(Hypothesis& h) {
   return std::find_if(
              h.settings.begin(), h.settings.end(),
@@ -99,18 +136,9 @@ double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h) {
   return reading_error_v(likelihood, likelihood.raw_residual(h, likelihood.unchanged()));
 }
 
-double Search::total(const HypothesisFit& f) const {
-  double cost = 0;
-  if (f.likeliest_cost)
-    cost = *f.likeliest_cost;
-  else
-    likelihood_.likeliest_noise(likelihood_.raw_residual(f.hypothesis, f.calibration), nominal_, cost);
-  return cost + f.cost - f.residual.squaredNorm();
-}
-
 double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
-  const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(f));
+  const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(likelihood_, nominal_, f));
   return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
 }
 
@@ -118,9 +146,15 @@ void Search::learn_totals(const std::vector<HypothesisFit>& fits) {
   std::vector<double> totals(fits.size());
   measurement::in_parallel(fits.size(), [&](std::size_t k) {
     const auto known = totals_.find(fits[k].cost);
-    totals[k] = known != totals_.end() ? known->second : total(fits[k]);
+    totals[k] = known != totals_.end() ? known->second : total(likelihood_, nominal_, fits[k]);
   });
   for (std::size_t k = 0; k < fits.size(); ++k) totals_[fits[k].cost] = totals[k];
+}
+
+HypothesisFit Search::converged(const HypothesisFit& f) {
+  HypothesisFit best = best_so_far(fitted_on(likelihood_, nominal_, f));
+  likelihood_.set_noise(best.noise);
+  return best;
 }
 
 HypothesisFit Search::with_own_noise(HypothesisFit f) { return own_noise_fit(likelihood_, nominal_, std::move(f)); }
@@ -165,7 +199,8 @@ HypothesisFit Search::best_so_far(HypothesisFit f) {
 }
 
 HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, const Foremost& foremost) {
-  const double hopeless = foremost.cost;
+  // the same mechanisms from another start count only if they are better
+  const double hopeless = c.mechanism == foremost.mechanism ? foremost.fit->cost : foremost.cost;
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
   const Start cheapest = cheapest_start(h, around, foremost);
@@ -306,7 +341,7 @@ std::vector<HypothesisFit> Search::in_place_of(const Replacement& r, const std::
   }
   std::vector<HypothesisFit> rivals =
       fitted(from, worth,
-             {r.best.cost + search_limits.hopeless, &r.best,
+             {r.best.cost + search_limits.hopeless, &r.best, r.mechanism,
               likelihood_.residual(without(r.best.hypothesis, r.mechanism), r.best.calibration)});
   for (HypothesisFit& f : rivals) f = best_so_far(std::move(f));
   return rivals;
@@ -347,6 +382,7 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
   measurement::in_parallel(foremost, [&](std::size_t k) {
     LikelihoodModel own = likelihood_;
     fits[k] = own_noise_fit(own, nominal_, std::move(fits[k]));
+    if (best.fit != nullptr) fits[k] = fitted_on(own, nominal_, std::move(fits[k]));  // as the best was
   });
   if (foremost > 0) likelihood_.set_noise(fits[foremost - 1].noise);
   return fits;
@@ -360,10 +396,24 @@ bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const 
 
 HypothesisFit Search::without_one(const HypothesisFit& f, std::size_t mechanism) {
   likelihood_.set_noise(f.noise);
-  HypothesisFit rest = best_so_far(with_own_noise(
-      likelihood_.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations)));
+  HypothesisFit rest = best_so_far(fitted_without(likelihood_, nominal_, f, mechanism));
   likelihood_.set_noise(rest.noise);
   return rest;
+}
+
+std::map<std::size_t, HypothesisFit> Search::without_each(const HypothesisFit& f) {
+  const std::vector<std::size_t> added = f.hypothesis.added();
+  std::vector<HypothesisFit> fits(added.size());
+  likelihood_.set_noise(f.noise);
+  likelihood_.linearise(f.hypothesis, f.calibration);
+  measurement::in_parallel(added.size(), [&](std::size_t k) {
+    LikelihoodModel own = likelihood_;
+    fits[k] = fitted_without(own, nominal_, f, added[k]);
+  });
+  learn_totals(fits);
+  std::map<std::size_t, HypothesisFit> by_mechanism;
+  for (std::size_t k = 0; k < added.size(); ++k) by_mechanism[added[k]] = best_so_far(std::move(fits[k]));
+  return by_mechanism;
 }
 
 void Search::report(std::string_view what) {

@@ -42,6 +42,9 @@ class Search {
   /// Fitted again with the noise model that its own residual makes most probable.
   HypothesisFit with_own_noise(HypothesisFit f);
 
+  /// Fitted on until nothing is gained any more, each time with base parameters' derivatives from where it stands.
+  HypothesisFit converged(const HypothesisFit& f);
+
   /// Gain of a hypothesis over a smaller one, without what was known beforehand.
   double gain(const HypothesisFit& less, const HypothesisFit& more);
 
@@ -71,6 +74,8 @@ class Search {
 
   /// The rest of a fit without a mechanism, fitted again from where it was.
   HypothesisFit without_one(const HypothesisFit& f, std::size_t mechanism);
+  /// The same without each of its mechanisms in turn, by mechanism.
+  std::map<std::size_t, HypothesisFit> without_each(const HypothesisFit& f);
 
   /// The best fit so far of each set of mechanisms.
   const std::map<std::vector<std::size_t>, HypothesisFit>& best_of_each() const { return best_; }
@@ -82,15 +87,14 @@ class Search {
   void report(std::string_view what);
 
  private:
-  /// -2 log posterior with the noise model that the residual makes most probable, at its price.
-  double total(const HypothesisFit& f) const;
-  /// The same of several, on all processors, for score().
+  /// The totals of several, on all processors, for score().
   void learn_totals(const std::vector<HypothesisFit>& fits);
   /// What candidates are compared with.
   struct Foremost {
     double cost = std::numeric_limits<double>::infinity();  ///< above it a fit is given up
     const HypothesisFit* fit = nullptr;
-    Eigen::VectorXd without;  ///< residual of `fit` without the mechanism in whose place the candidates are
+    std::size_t mechanism = no_mechanism;  ///< of `fit`, in whose place the candidates are
+    Eigen::VectorXd without;               ///< residual of `fit` without it
   };
   /// The better one of this fit and that of the same mechanisms which was the best so far.
   HypothesisFit best_so_far(HypothesisFit f);

@@ -61,35 +61,45 @@ class Elimination {
     found_.best = grown;
   }
 
-  /// Returns true if the best hypothesis has changed: then everything is compared again.
+  /// Returns true if the best hypothesis has changed: then everything is compared again. What is not needed goes before
+  /// the rest is compared with rivals.
   bool round() {
-    if (search_.stopped()) return false;
+    if (search_.stopped() || found_.best.hypothesis.added().empty()) return false;
     found_.rivals.clear();
     found_.gains.clear();
+    found_.best = search_.converged(found_.best);
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
     const double all_gain = search_.gain(control_, found_.best);
-    struct Reduced {
-      bool certain;  // the mechanism that it lacks
-      double gain;   // of that mechanism
-      HypothesisFit fit;
-    };
-    std::vector<Reduced> reduced;  // without those that are not needed
+    const bool alone = found_.best.hypothesis.added().size() == 1;
+    std::map<std::size_t, HypothesisFit> without;
+    if (alone)
+      without[found_.best.hypothesis.added().front()] = control_;
+    else
+      without = search_.without_each(found_.best);
+    struct Needless {
+      bool certain;
+      double gain;
+      std::size_t mechanism = no_mechanism;
+    } least{};
     for (const std::size_t m : found_.best.hypothesis.added()) {
-      const bool alone = found_.best.hypothesis.added().size() == 1;
-      const HypothesisFit without = alone ? control_ : search_.without_one(found_.best, m);
-      const double gain = found_.gains[m] = search_.gain(without, found_.best);
-      if (gain < 0 && begins_better(m, without)) return true;
-      const bool credible = is_credible(found_.best, m);
-      if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
-        reduced.push_back({scope_.expected.contains(m), gain, without});
-      else if (compare_with_rivals(m, without))
-        return true;
+      const double gain = found_.gains[m] = search_.gain(without[m], found_.best);
+      if (gain < 0 && begins_better(m, without[m])) return true;
+      const bool needed = gain >= selection_limits.detected && is_credible(found_.best, m) &&
+                          (alone || counts(m, gain, all_gain, rms_v.at(m)));
+      const bool certain = scope_.expected.contains(m);
+      if (!needed &&
+          (least.mechanism == no_mechanism || std::pair(certain, gain) < std::pair(least.certain, least.gain)))
+        least = {certain, gain, m};
     }
-    if (reduced.empty()) return false;
-    found_.best = std::min_element(reduced.begin(), reduced.end(), [](const Reduced& a, const Reduced& b) {
-                    return std::pair(a.certain, a.gain) < std::pair(b.certain, b.gain);
-                  })->fit;
-    return true;
+    if (least.mechanism != no_mechanism) {
+      found_.best = std::move(without[least.mechanism]);
+      return true;
+    }
+    for (const auto& [m, rest] : without) {
+      if (compare_with_rivals(m, rest)) return true;
+    }
+    for (const auto& [m, rest] : without) found_.gains[m] = search_.gain(rest, found_.best);
+    return false;
   }
 
   /// Returns true if something as simple that was fitted on the way is better by what is needed to be found, credible,
@@ -212,7 +222,7 @@ class Elimination {
     return true;
   }
 
-  /// Returns true if a rival, or the same mechanisms from another start, has become the best.
+  /// Returns true if a rival, or the same mechanisms from another start by what matters, has become the best.
   bool compare_with_rivals(std::size_t m, const HypothesisFit& without) {
     HypothesisFit& best = found_.best;
     bool changed = false;
@@ -227,9 +237,12 @@ class Elimination {
           same_mechanisms || (!scope_.expected.contains(m) && std::all_of(added.begin(), added.end(), [&](auto other) {
             return best.hypothesis.find(other) != nullptr || is_credible(rival, other);
           }));
-      if (replaceable && search_.score(rival) < search_.score(best) - ahead) {
+      const double better_by = search_.score(best) - search_.score(rival);
+      if (replaceable && better_by > ahead) {
         best = rival;
-        changed = true;
+        // minima of the same mechanisms lie side by side where a hysteresis turns round: what is compared stays as it
+        // is
+        changed = changed || !same_mechanisms || better_by > selection_limits.detected;
       }
       if (!same_mechanisms) found_.rivals[m].push_back(std::move(rival));
     }
