@@ -69,16 +69,45 @@ const char* experiment_that_shows(Quantity quantity) {
   }
 }
 
-void warn_of_parameter(const Parameter& p, Quantity quantity, std::vector<std::string>& warnings) {
-  const std::string where = fmt::format("{} at {:.0f} %", p.name, 100 * p.soc);
-  const char* experiment = experiment_that_shows(quantity);
-  if (!p.identifiable)
-    warnings.push_back(fmt::format("not_seen: this recording does not determine {}; {}", where, experiment));
-  else if (p.at_bound)
-    warnings.push_back(fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, p.value, experiment));
-  else if (p.std > uncertain_fraction * std::abs(p.value) && quantity != Quantity::ocv_branch)
-    warnings.push_back(fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where, p.value,
-                                   p.std, experiment));
+enum class Doubt { none, not_seen, at_bound, uncertain };
+
+/// Parameters of one name with the same doubt, at neighbouring nodes.
+struct Doubtful {
+  Doubt doubt = Doubt::none;
+  Quantity quantity{};
+  std::vector<Parameter> nodes;
+};
+
+Doubt doubt_about(const Parameter& p, Quantity quantity) {
+  if (!p.identifiable) return Doubt::not_seen;
+  if (p.at_bound) return Doubt::at_bound;
+  const bool uncertain = p.std > uncertain_fraction * std::abs(p.value) && quantity != Quantity::ocv_branch;
+  return uncertain ? Doubt::uncertain : Doubt::none;
+}
+
+std::string warning_of(const Doubtful& d) {
+  const Parameter &first = d.nodes.front(), &last = d.nodes.back();
+  const bool one = d.nodes.size() == 1;
+  const std::string where = one ? fmt::format("{} at {:.0f} %", first.name, 100 * first.soc)
+                                : fmt::format("{} at {:.0f} to {:.0f} % ({} points)", first.name, 100 * first.soc,
+                                              100 * last.soc, d.nodes.size());
+  const char* experiment = experiment_that_shows(d.quantity);
+  switch (d.doubt) {
+    case Doubt::not_seen:
+      return fmt::format("not_seen: this recording does not determine {}; {}", where, experiment);
+    case Doubt::at_bound:
+      return one ? fmt::format("at_bound: {} ended at its bound of {:g}; {}", where, first.value, experiment)
+                 : fmt::format("at_bound: {} ended at a bound; {}", where, experiment);
+    default:
+      break;
+  }
+  if (one)
+    return fmt::format("uncertain: {} is {:.3g} with a standard deviation of {:.2g}; {}", where, first.value, first.std,
+                       experiment);
+  double most = 0;
+  for (const Parameter& p : d.nodes) most = std::max(most, p.std / std::abs(p.value));
+  return fmt::format("uncertain: {} has standard deviations of up to {:.0f} % of its values; {}", where, 100 * most,
+                     experiment);
 }
 
 void warn_of_search(Identification& result) {
@@ -140,6 +169,7 @@ Uncertainty uncertainty_at(const GreyBox& grey_box, const LeastSquares& problem,
 /// Parameters, initial states and their warnings from the unknowns at the optimum.
 void set_parameters(const GreyBox& grey_box, const Uncertainty& u, Identification& result) {
   const Eigen::VectorXd& x = result.optimum.x;
+  std::vector<Doubtful> doubtful;  // neighbouring nodes of a parameter with the same doubt share a warning
   for (const DataSet& record : grey_box.records()) result.initial.push_back({record.initial_soc, 0, 0, true});
   for (Eigen::Index k = 0; k < x.size(); ++k) {
     const Unknown& unknown = grey_box.unknowns()[static_cast<std::size_t>(k)];
@@ -160,8 +190,16 @@ void set_parameters(const GreyBox& grey_box, const Uncertainty& u, Identificatio
                                    .by_ocv_tolerance = std::abs(u.offset[k]),
                                    .at_bound = at_bound,
                                    .identifiable = at_bound || identifiable});
-      warn_of_parameter(result.parameters.back(), unknown.quantity, result.warnings);
+      const Parameter& p = result.parameters.back();
+      const Doubt doubt = doubt_about(p, unknown.quantity);
+      const bool alike =
+          !doubtful.empty() && doubtful.back().doubt == doubt && doubtful.back().nodes.back().name == p.name;
+      if (!alike) doubtful.push_back({doubt, unknown.quantity, {}});
+      doubtful.back().nodes.push_back(p);
     }
+  }
+  for (const Doubtful& d : doubtful) {
+    if (d.doubt != Doubt::none) result.warnings.push_back(warning_of(d));
   }
 }
 

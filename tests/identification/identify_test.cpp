@@ -12,6 +12,7 @@ namespace {
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 model::CellParameters<> table9() { return files::read_cell("table9").parameters; }
@@ -191,6 +192,17 @@ TEST(Identify, AnInvertedCurrentEndsAtABoundAndGivesAWarning) {
   options.soc_nodes = {0.5};
   const Identification found = identify_grey_box(table9(), {r}, options, Method::trust_region_reflective);
   EXPECT_THAT(found.warnings, Contains(HasSubstr("at_bound: r0_ohm at 50 %")));
+}
+
+TEST(Identify, NeighbouringNodesWithTheSameDoubtShareAWarning) {
+  const PlantRun run = run_plant(*experiments::experiment("high_1m_low_30s"), 0.5);
+  DataSet r = record_of(run, 0.5);
+  for (double& i : r.data.current_a.edit()) i = -i;
+  GreyBoxOptions options;
+  options.soc_nodes = {0.49, 0.5, 0.51};
+  const Identification found = identify_grey_box(table9(), {r}, options, Method::trust_region_reflective);
+  EXPECT_THAT(found.warnings, Contains(HasSubstr("at_bound: r0_ohm at 49 to 51 % (3 points) ended at a bound")));
+  EXPECT_THAT(found.warnings, Not(Contains(HasSubstr("r0_ohm at 50 %"))));
 }
 
 }  // namespace
