@@ -242,7 +242,7 @@ class Elimination {
         best = rival;
         // minima of the same mechanisms lie side by side where a hysteresis turns round: what is compared stays as it
         // is
-        changed = changed || !same_mechanisms || better_by > selection_limits.detected;
+        changed = changed || !same_mechanisms || better_by > numerics.search.another_minimum;
       }
       if (!same_mechanisms) found_.rivals[m].push_back(std::move(rival));
     }
