@@ -21,6 +21,10 @@ double total_duration_s(const std::vector<PreparedRecording>& records) {
   return sum_s;
 }
 
+bool is_of_current(std::size_t m) {
+  return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
+}
+
 /// RMS error of a fit [V].
 double error_of(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   measurement::MeanSquare error;
@@ -91,9 +95,6 @@ std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
 }
 
 HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
-  const auto is_of_current = [](std::size_t m) {
-    return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
-  };
   const std::vector<std::size_t> added = fit.hypothesis.added();
   if (std::none_of(added.begin(), added.end(), is_of_current)) return {};
   if (error_of(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return {};
@@ -124,8 +125,20 @@ Survivors HealthyJudge::nothing_of(const Survivors& found) {
   return {control_, {}, {}, {}};
 }
 
+Survivors HealthyJudge::with_current_sensor(Survivors found) {
+  std::vector<std::size_t> sensor = scope_.searched;
+  std::erase_if(sensor, [](std::size_t m) { return !is_of_current(m); });
+  const std::vector<HypothesisFit> fits = search_.one_more(control_, sensor);
+  if (fits.empty() || search_.score(fits.front()) >= search_.score(found.best)) return found;
+  return eliminate(search_, likelihood_, control_, fits.front(), scope_);
+}
+
 Survivors HealthyJudge::without_withheld(Survivors found) {
   cover_true_current(found);
+  if (!is_covered()) {
+    found = with_current_sensor(std::move(found));
+    cover_true_current(found);
+  }
   if (!is_covered()) return nothing_of(found);
   for (bool removed = true; removed;) {
     removed = false;

@@ -66,5 +66,19 @@ TEST(RealFaults, ACurrentIsNotLostAmongCausesThatMayNotStay) {
   }
 }
 
+TEST(RealFaults, AGainIsFoundFarBeyondTheHealthyCurrents) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no " << data;
+  const auto causes = [](const std::string& cell, const std::vector<std::string>& healthy, const std::string& recording,
+                         double capacity_ah, double gain) {
+    return first_causes(cell, healthy, recording, capacity_ah, [&](measurement::Recording& r) {
+      for (double& a : r.current_a.edit()) a *= 1 + gain;
+    });
+  };
+  EXPECT_TRUE(contains(causes("B0043", {"d004", "d006"}, "d002", 1.7, 0.371), "current_gain"))
+      << "between the starts of a fit, the reading counts the cell to far below empty";
+  EXPECT_TRUE(contains(causes("B0005", {"d508", "d613"}, "d587", 1.34, 0.531), "current_gain"))
+      << "the signature sees nothing of it";
+}
+
 }  // namespace
 }  // namespace bms::workflow
