@@ -6,6 +6,7 @@
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/credibility.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/one_current.hpp"
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
 
@@ -16,6 +17,16 @@ namespace {
 constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
+
+bool is_resistance(std::size_t m) {
+  return m == model::mechanism_index_of<model::ContactStep> || m == model::mechanism_index_of<model::ResistanceGrowth>;
+}
+
+/// RMS of a raw residual, of the voltages that were read.
+double fitted_error_v(const LikelihoodModel& likelihood, const Columns& raw) {
+  return std::sqrt(raw.topRows(static_cast<Eigen::Index>(likelihood.readings())).squaredNorm() /
+                   static_cast<double>(std::max<std::size_t>(likelihood.used(), 1)));
+}
 
 /// Largest factor by which the variance of one of a mechanism's strengths is wider with the error of the model.
 double widening(const Hypothesis& narrow, const Hypothesis& wide, std::size_t mechanism) {
@@ -57,7 +68,8 @@ class Elimination {
         likelihood_(likelihood),
         control_(control),
         scope_(scope),
-        error_v_(plain_error_v(likelihood, likelihood.base())) {
+        error_v_(plain_error_v(likelihood, likelihood.base())),
+        one_current_(has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) {
     found_.best = grown;
   }
 
@@ -80,7 +92,8 @@ class Elimination {
       const double gain = found_.gains[m] = search_.gain(without, found_.best);
       if (gain < 0 && begins_better(m, without)) return true;
       const bool credible = is_credible(found_.best, m);
-      if (gain < selection_limits.detected || !credible || !(alone || counts(m, gain, all_gain, rms_v.at(m))))
+      if (gain < selection_limits.detected || !credible ||
+          !(alone || (counts(m, gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without, rms_v))))
         reduced.push_back({scope_.expected.contains(m), gain, without});
       else if (compare_with_rivals(m, without))
         return true;
@@ -139,7 +152,8 @@ class Elimination {
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
     return scope_.expected.contains(m) || (!is_weak(f, m, scope_.expected) && !is_implausible(f, m) &&
-                                           !is_within_jitter(f, m, likelihood_.facts().step_s));
+                                           !is_within_jitter(f, m, likelihood_.facts().step_s) &&
+                                           !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
   }
 
   /// The cell file may contain what is certain in other tables, and has a small error then.
@@ -184,6 +198,19 @@ class Elimination {
     const bool seen =
         rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
     return seen && !is_too_large(m, rms_v);
+  }
+
+  /// Returns true if what a slow cause explains next to a larger resistance is no more than that resistance may wander.
+  bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
+    if (scope_.expected.contains(m) || is_resistance(m) || comes_and_goes(m) ||
+        model::catalogue[m].domain != model::Domain::physics)
+      return false;
+    double resistance_v = 0;
+    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, is_resistance(other) ? v : 0);
+    const auto error_v = [&](const HypothesisFit& f) {
+      return fitted_error_v(likelihood_, likelihood_.raw_residual(f.hypothesis, f.calibration));
+    };
+    return error_v(without) < std::hypot(error_v(found_.best), selection_limits.contact_wander * resistance_v);
   }
 
   /// begins_better() for each mechanism whose gain is not known.
@@ -242,6 +269,7 @@ class Elimination {
   const HypothesisFit& control_;
   const Scope& scope_;
   double error_v_;
+  bool one_current_;
   Survivors found_;  ///< its best is the current hypothesis
 };
 
