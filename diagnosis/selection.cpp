@@ -18,10 +18,6 @@ constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
 bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
-bool is_resistance(std::size_t m) {
-  return m == model::mechanism_index_of<model::ContactStep> || m == model::mechanism_index_of<model::ResistanceGrowth>;
-}
-
 /// RMS of a raw residual, of the voltages that were read.
 double fitted_error_v(const LikelihoodModel& likelihood, const Columns& raw) {
   return std::sqrt(raw.topRows(static_cast<Eigen::Index>(likelihood.readings())).squaredNorm() /
@@ -200,13 +196,19 @@ class Elimination {
     return seen && !is_too_large(m, rms_v);
   }
 
-  /// Returns true if what a slow cause explains next to a larger resistance is no more than that resistance may wander.
+  /// Returns true for a contact, or what is not distinguished from one at one current.
+  bool may_be_contact(std::size_t m) const {
+    return m == model::mechanism_index_of<model::ContactStep> ||
+           (one_current_ && m == model::mechanism_index_of<model::ResistanceGrowth>);
+  }
+
+  /// Returns true if what a slow cause explains next to a contact is no more than the contact may wander.
   bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
-    if (scope_.expected.contains(m) || is_resistance(m) || comes_and_goes(m) ||
+    if (scope_.expected.contains(m) || may_be_contact(m) || comes_and_goes(m) ||
         model::catalogue[m].domain != model::Domain::physics)
       return false;
     double resistance_v = 0;
-    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, is_resistance(other) ? v : 0);
+    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, may_be_contact(other) ? v : 0);
     const auto error_v = [&](const HypothesisFit& f) {
       return fitted_error_v(likelihood_, likelihood_.raw_residual(f.hypothesis, f.calibration));
     };
