@@ -197,14 +197,14 @@ class Elimination {
   }
 
   /// Returns true for a contact, or what is not distinguished from one at one current.
-  bool may_be_contact(std::size_t m) const {
+  static bool may_be_contact(std::size_t m) {
     return m == model::mechanism_index_of<model::ContactStep> ||
-           (one_current_ && m == model::mechanism_index_of<model::ResistanceGrowth>);
+           m == model::mechanism_index_of<model::ResistanceGrowth>;
   }
 
-  /// Returns true if what a slow cause explains next to a contact is no more than the contact may wander.
+  /// Returns true if what a slow cause explains next to a contact, at one current, is no more than it may wander.
   bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
-    if (scope_.expected.contains(m) || may_be_contact(m) || comes_and_goes(m) ||
+    if (!one_current_ || scope_.expected.contains(m) || may_be_contact(m) || comes_and_goes(m) ||
         model::catalogue[m].domain != model::Domain::physics)
       return false;
     double resistance_v = 0;
