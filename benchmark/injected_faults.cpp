@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/catalogue.hpp"
+
 namespace bms::benchmark {
 
 namespace {
@@ -77,5 +79,12 @@ const std::array<InjectedFault, 8> injected_faults = {{
     {"contact_step", {0.0025, 0.005, 0.01}, contact, times_ah},
     {"contact_intermittent", {0.01, 0.02, 0.04}, loose_contact, times_ah},
 }};
+
+bool is_within_bounds(const InjectedFault& fault, double size, double capacity_ah) {
+  if (fault.first_parameter == nullptr) return true;
+  const model::Parameter& p = model::catalogue[model::mechanism_index(fault.id)].parameter[0];
+  const double value = fault.first_parameter(size, capacity_ah);
+  return value >= p.lower(capacity_ah) && value <= p.upper(capacity_ah);
+}
 
 }  // namespace bms::benchmark

@@ -20,4 +20,8 @@ struct InjectedFault {
 
 extern const std::array<InjectedFault, 8> injected_faults;
 
+/// Returns true if a real instrument or contact can be that wrong: the first parameter is within its bounds. What is
+/// beyond cannot be named.
+bool is_within_bounds(const InjectedFault& fault, double size, double capacity_ah);
+
 }  // namespace bms::benchmark

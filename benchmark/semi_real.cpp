@@ -117,6 +117,7 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
   r.fault = fault == nullptr ? "" : std::string(fault->id);
   r.held_out = set.held_out;
   r.size = size;
+  r.within_bounds = fault == nullptr || is_within_bounds(*fault, size, p.cell.parameters.capacity_ah);
   if (fault == nullptr) {
     for (const bms::diagnosis::DetectionLimit& l : d.limits) limits[id_of(l.mechanism)] = l.value;
   } else if (fault->first_parameter != nullptr && limits.contains(std::string(fault->id))) {

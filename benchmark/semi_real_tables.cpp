@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -32,6 +33,9 @@ std::string share(const std::vector<Result>& results, const Which& counts, const
   }
   return fmt::format("{} of {}", n, of);
 }
+
+/// "0.5", "2".
+std::string times_text(double over_limit) { return fmt::format("{:.2g}", over_limit); }
 
 std::string hours_of(const std::vector<Result>& results, bool held_out) {
   double hours = 0;
@@ -90,6 +94,36 @@ std::string by_cell(const std::vector<Result>& results) {
 
 }  // namespace
 
+std::string by_size(const std::vector<Result>& results) {
+  std::map<double, std::string> sizes;
+  for (const Result& r : results) {
+    if (!r.fault.empty() && r.over_limit)
+      sizes.emplace(std::stod(times_text(*r.over_limit)), times_text(*r.over_limit));
+  }
+  if (sizes.empty()) return "";
+  std::string text =
+      "\n| size, in stated limits | bounds of a real instrument | faults | detected | first name right | another name "
+      "first | DATA_FAULT | NOT_TESTABLE |\n|---|---|---|---|---|---|---|---|\n";
+  for (const auto& [times, name] : sizes) {
+    for (const bool within : {true, false}) {
+      const Which here = [&](const Result& r) {
+        return !r.fault.empty() && r.over_limit && times_text(*r.over_limit) == name && r.within_bounds == within;
+      };
+      const auto count = [&](const Which& yes) {
+        return std::count_if(results.begin(), results.end(), [&](const Result& r) { return here(r) && yes(r); });
+      };
+      if (count([](const Result&) { return true; }) == 0) continue;
+      text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", name, within ? "within" : "beyond",
+                          count([](const Result&) { return true; }), count([](const Result& r) { return r.detected; }),
+                          count([](const Result& r) { return r.first_right; }),
+                          count([](const Result& r) { return r.named && !r.first_right; }),
+                          count([](const Result& r) { return r.verdict == "DATA_FAULT"; }),
+                          count([](const Result& r) { return r.verdict == "NOT_TESTABLE"; }));
+    }
+  }
+  return text;
+}
+
 std::string table_of(const std::vector<Result>& results) {
   std::string text = "\n| figure | development cells | held-out cells |\n|---|---|---|\n";
   const auto row = [&](const char* name, const Which& counts, const Which& yes) {
@@ -131,7 +165,7 @@ std::string table_of(const std::vector<Result>& results) {
   text += "| readings within the 95 % band; its half width over the error |";
   for (const bool held_out : {false, true})
     text += " " + bands_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
-  text += "\n" + by_cell(results);
+  text += "\n" + by_cell(results) + by_size(results);
   double slowest_s = 0;
   for (const Result& r : results) slowest_s = std::max(slowest_s, r.wall_s);
   return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
@@ -149,6 +183,7 @@ std::string json_of(const std::vector<Result>& results) {
                     {"found", r.found},
                     {"withheld", r.withheld},
                     {"over_limit", or_null(r.over_limit)},
+                    {"within_bounds", r.within_bounds},
                     {"first_right", r.first_right},
                     {"sigmas", or_null(r.sigmas)},
                     {"band_within", or_null(r.band_within)},
@@ -161,13 +196,14 @@ std::string json_of(const std::vector<Result>& results) {
 }
 
 std::string line_of(const SemiRealResult& r) {
-  return fmt::format("{:40} {:20} {:<7.3g} {:6} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}{}\n", r.set,
-                     r.fault.empty() ? "(healthy)" : r.fault, r.size,
-                     r.over_limit ? fmt::format("{:.2g} L", *r.over_limit) : "-", r.verdict, 1e3 * r.error_v,
-                     1e3 * r.remaining_v, r.wall_s, r.found, r.withheld.empty() ? "" : " | withheld: " + r.withheld,
-                     r.band_within ? fmt::format(" | band {:.1f} %, {:.2g} times the error", 100 * *r.band_within,
-                                                 r.band_over_error.value_or(0))
-                                   : "");
+  return fmt::format(
+      "{:40} {:20} {:<7.3g} {:6}{} {:12} {:6.1f} -> {:6.1f} mV {:6.1f} s  {}{}{}\n", r.set,
+      r.fault.empty() ? "(healthy)" : r.fault, r.size, r.over_limit ? times_text(*r.over_limit) + " L" : "-",
+      r.within_bounds ? "" : " beyond bounds", r.verdict, 1e3 * r.error_v, 1e3 * r.remaining_v, r.wall_s, r.found,
+      r.withheld.empty() ? "" : " | withheld: " + r.withheld,
+      r.band_within
+          ? fmt::format(" | band {:.1f} %, {:.2g} times the error", 100 * *r.band_within, r.band_over_error.value_or(0))
+          : "");
 }
 
 }  // namespace bms::benchmark

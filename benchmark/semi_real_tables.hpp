@@ -13,6 +13,7 @@ struct SemiRealResult {
   bool held_out = false;
   double size = 0;
   std::string verdict, found, withheld;
+  bool within_bounds = true;  ///< a real instrument or contact can be that wrong
   bool detected = false, first_right = false, named = false;
   std::optional<double> over_limit;       ///< size over the stated detection limit
   std::optional<double> sigmas;           ///< of the found size from the true one
@@ -22,6 +23,9 @@ struct SemiRealResult {
 };
 
 std::string line_of(const SemiRealResult& r);
+/// Faults by their size in stated limits, and of each size those within the bounds of a real instrument and those
+/// beyond. Beyond them no name is right but that of the fault; not to name anything is right as well.
+std::string by_size(const std::vector<SemiRealResult>& results);
 /// Figures of all development and held-out cells, and of each cell.
 std::string table_of(const std::vector<SemiRealResult>& results);
 std::string json_of(const std::vector<SemiRealResult>& results);

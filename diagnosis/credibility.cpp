@@ -102,4 +102,19 @@ bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step
          std::abs(f.hypothesis.find(mechanism)->value[0]) < thresholds.noise.edge_jitter * step_s;
 }
 
+bool is_at_the_end(const HypothesisFit& f, std::size_t mechanism, const std::vector<PreparedRecording>& records) {
+  const auto is_late = [](const PreparedRecording& r, double at_s) {
+    return at_s >= r.time_s.back() - credible_limits.end_share * r.duration_s();
+  };
+  if (knowledge_of(mechanism).signature == Signature::contact_change)
+    return records.size() == 1 && is_late(records.front(), f.hypothesis.find(mechanism)->value[contact_onset]);
+  if (knowledge_of(mechanism).signature != Signature::contact_bursts) return false;
+  for (std::size_t r = 0; r < std::min(records.size(), f.hypothesis.bursts.size()); ++r) {
+    const std::vector<model::Span>& bursts = f.hypothesis.bursts[r];
+    if (std::any_of(bursts.begin(), bursts.end(), [&](const auto& span) { return !is_late(records[r], span.start_s); }))
+      return false;
+  }
+  return true;
+}
+
 }  // namespace bms::diagnosis

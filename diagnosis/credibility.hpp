@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <set>
+#include <vector>
 
 #include "diagnosis/likelihood_model.hpp"
 
@@ -23,5 +24,9 @@ bool is_implausible(const HypothesisFit& f, std::size_t mechanism);
 /// Returns true for a skew of less than what the noise model grants each reading next to an edge of the current
 /// (thresholds.noise.edge_jitter). step_s: between rows.
 bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step_s);
+
+/// Returns true for a contact that is open only at the end of records, in the last twelfth of each
+/// (thresholds.decision. end_share): bursts that begin there, or a change of a single record.
+bool is_at_the_end(const HypothesisFit& f, std::size_t mechanism, const std::vector<PreparedRecording>& records);
 
 }  // namespace bms::diagnosis

@@ -136,6 +136,10 @@ double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h) {
   return reading_error_v(likelihood, likelihood.raw_residual(h, likelihood.unchanged()));
 }
 
+double fitted_error_v(const LikelihoodModel& likelihood, const HypothesisFit& f) {
+  return reading_error_v(likelihood, likelihood.raw_residual(f.hypothesis, f.calibration));
+}
+
 double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
   const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(likelihood_, nominal_, f));

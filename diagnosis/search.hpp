@@ -24,6 +24,8 @@ using Stopped = std::function<bool()>;
 /// RMS of measured less predicted [V] by a hypothesis with the cell file's own base parameters: what an extended cell
 /// file would achieve.
 double plain_error_v(const LikelihoodModel& likelihood, const Hypothesis& h);
+/// The same of a fit with its base parameters.
+double fitted_error_v(const LikelihoodModel& likelihood, const HypothesisFit& f);
 
 /// What the unknowns of a mechanism cost. What is known of most cells is not an unknown.
 double price_of_unknowns(std::size_t mechanism);

@@ -6,6 +6,7 @@
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/credibility.hpp"
 #include "diagnosis/locate.hpp"
+#include "diagnosis/one_current.hpp"
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
 
@@ -57,7 +58,8 @@ class Elimination {
         likelihood_(likelihood),
         control_(control),
         scope_(scope),
-        error_v_(plain_error_v(likelihood, likelihood.base())) {
+        error_v_(plain_error_v(likelihood, likelihood.base())),
+        one_current_(has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) {
     found_.best = grown;
   }
 
@@ -84,8 +86,9 @@ class Elimination {
     for (const std::size_t m : found_.best.hypothesis.added()) {
       const double gain = found_.gains[m] = search_.gain(without[m], found_.best);
       if (gain < 0 && begins_better(m, without[m])) return true;
-      const bool needed = gain >= selection_limits.detected && is_credible(found_.best, m) &&
-                          (alone || counts(m, gain, all_gain, rms_v.at(m)));
+      const bool needed =
+          gain >= selection_limits.detected && is_credible(found_.best, m) &&
+          (alone || (counts(m, gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without[m], rms_v)));
       const bool certain = scope_.expected.contains(m);
       if (!needed &&
           (least.mechanism == no_mechanism || std::pair(certain, gain) < std::pair(least.certain, least.gain)))
@@ -149,7 +152,8 @@ class Elimination {
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
     return scope_.expected.contains(m) || (!is_weak(f, m, scope_.expected) && !is_implausible(f, m) &&
-                                           !is_within_jitter(f, m, likelihood_.facts().step_s));
+                                           !is_within_jitter(f, m, likelihood_.facts().step_s) &&
+                                           !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
   }
 
   /// The cell file may contain what is certain in other tables, and has a small error then.
@@ -194,6 +198,23 @@ class Elimination {
     const bool seen =
         rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
     return seen && !is_too_large(m, rms_v);
+  }
+
+  /// Returns true for a contact, or what is not distinguished from one at one current.
+  static bool may_be_contact(std::size_t m) {
+    return m == model::mechanism_index_of<model::ContactStep> ||
+           m == model::mechanism_index_of<model::ResistanceGrowth>;
+  }
+
+  /// Returns true if what a slow cause explains next to a contact, at one current, is no more than it may wander.
+  bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
+    if (!one_current_ || scope_.expected.contains(m) || may_be_contact(m) || comes_and_goes(m) ||
+        model::catalogue[m].domain != model::Domain::physics)
+      return false;
+    double resistance_v = 0;
+    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, may_be_contact(other) ? v : 0);
+    return fitted_error_v(likelihood_, without) <
+           std::hypot(fitted_error_v(likelihood_, found_.best), selection_limits.contact_wander * resistance_v);
   }
 
   /// begins_better() for each mechanism whose gain is not known.
@@ -255,6 +276,7 @@ class Elimination {
   const HypothesisFit& control_;
   const Scope& scope_;
   double error_v_;
+  bool one_current_;
   Survivors found_;  ///< its best is the current hypothesis
 };
 

@@ -210,8 +210,8 @@ std::string statement(const Diagnosis& d, const RecordingFacts& facts) {
     case Verdict::data_fault:
       return d.faults.empty() ? "The recording is not plausible." : d.faults.front().text;
     case Verdict::not_testable:
-      return d.withheld.empty() ? "No diagnosis is possible from this recording."
-                                : withheld_text(d, model_error(facts));
+      return d.withheld.empty() && !goes_beyond_healthy(d) ? "No diagnosis is possible from this recording."
+                                                           : withheld_text(d, model_error(facts));
   }
   return "";
 }

@@ -9,11 +9,13 @@
 
 #include <Eigen/Core>
 
+#include "diagnosis/healthy_coverage.hpp"
 #include "diagnosis/healthy_null.hpp"
 #include "diagnosis/hypothesis.hpp"
 #include "diagnosis/law_term.hpp"
 #include "diagnosis/noise.hpp"
 #include "diagnosis/recording_check.hpp"
+#include "diagnosis/thresholds.hpp"
 #include "model/cell_parameters.hpp"
 
 namespace bms::diagnosis {
@@ -98,7 +100,7 @@ struct HealthyBasis {
   double hours = 0;
   std::size_t recordings = 0, blocks = 0;
   double false_alarm_rate = 0;
-  double covered = 1;  ///< share of the rows at charges, temperatures and currents of the healthy blocks
+  HealthyCoverage covered = {1, 1, {}};
 };
 
 /// For plots, one value per row.
@@ -138,11 +140,18 @@ struct Diagnosis {
   double base_cost = 0, best_cost = 0, remaining = 0, adequacy = 1, fast_excess = 0, far_out = 0;
 };
 
-/// Returns true if nothing was named, and more healthy data would decide whether a cause that was withheld is one.
+/// Returns true if a recording goes where the healthy ones did not: nothing found there does not prove that nothing is
+/// there, because the cell file's tolerance is all that is known of it.
+inline bool goes_beyond_healthy(const Diagnosis& d) {
+  return d.healthy && d.healthy->covered.least < thresholds.healthy.covered_at_least;
+}
+
+/// Returns true if nothing was named, and more healthy data would decide whether a cause is there.
 inline bool more_healthy_data_would_decide(const Diagnosis& d) {
-  return d.findings.empty() && std::any_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) {
-           return w.healthy.hours_needed.has_value() || w.not_covered;
-         });
+  const bool withheld = std::any_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) {
+    return w.healthy.hours_needed.has_value() || w.not_covered;
+  });
+  return d.findings.empty() && (withheld || goes_beyond_healthy(d));
 }
 
 }  // namespace bms::diagnosis

@@ -17,6 +17,29 @@ std::string name_of(const Withheld& w) {
   return w.mechanism == no_mechanism ? "an unknown cause" : std::string(text_of_mechanism(w.mechanism).name);
 }
 
+/// "its temperature is 39 to 41 degrees C, that of the healthy ones 20 to 22"
+std::string text_of(const BeyondHealthy& b) {
+  if (b.axis == "soc")
+    return fmt::format("its state of charge is {:.0f} to {:.0f} %, that of the healthy ones {:.0f} to {:.0f}",
+                       100 * b.recorded.low, 100 * b.recorded.high, 100 * b.healthy.low, 100 * b.healthy.high);
+  if (b.axis == "temperature_c")
+    return fmt::format("its temperature is {:.0f} to {:.0f} degrees C, that of the healthy ones {:.0f} to {:.0f}",
+                       b.recorded.low, b.recorded.high, b.healthy.low, b.healthy.high);
+  return fmt::format("its current goes to {:.1f} A, that of the healthy ones to {:.1f}", b.recorded.high,
+                     b.healthy.high);
+}
+
+/// "only 12 % of it lies at states of charge, ... of the healthy recordings: its temperature is ..."
+std::string not_covered_reason(const HealthyBasis& healthy) {
+  if (healthy.blocks == 0) return "no healthy recording could be compared with a cell file that was made without it";
+  std::vector<std::string> beyond;
+  for (const BeyondHealthy& b : healthy.covered.beyond) beyond.push_back(text_of(b));
+  return fmt::format(
+      "only {:.0f} % of the recording lies at states of charge, temperatures and currents of the healthy "
+      "recordings{}{}",
+      100 * healthy.covered.least, beyond.empty() ? "" : ": ", joined(beyond, "and"));
+}
+
 }  // namespace
 
 std::string reason_of(const Withheld& w, const Diagnosis& of) {
@@ -26,11 +49,7 @@ std::string reason_of(const Withheld& w, const Diagnosis& of) {
         "all that speaks for {} lies between {:.0f} and {:.0f} s, and no healthy recording of this cell says how wrong "
         "the model is there; about {} of them would decide",
         name_of(w), w.only_place->start_s, w.only_place->end_s, hours_text(w.healthy.hours_needed.value_or(0)));
-  if (w.not_covered)
-    return fmt::format(
-        "only {:.0f} % of the recording lies at states of charge, temperatures and currents of the healthy "
-        "recordings",
-        100 * healthy.covered);
+  if (w.not_covered) return not_covered_reason(healthy);
   if (w.healthy.hours_needed)
     return fmt::format("{} of healthy recordings are too little, about {} would do", hours_text(healthy.hours),
                        hours_text(*w.healthy.hours_needed));
@@ -38,17 +57,25 @@ std::string reason_of(const Withheld& w, const Diagnosis& of) {
 }
 
 std::string withheld_text(const Diagnosis& d, const std::string& error) {
+  const std::string there =
+      d.healthy && d.healthy->blocks == 0
+          ? "Identify the cell again with at least two healthy recordings like this one (bms identify --healthy)."
+          : "Identify the cell again with healthy recordings there (bms identify --healthy).";
   // what more data would decide first
   const auto undecided = std::find_if(d.withheld.begin(), d.withheld.end(),
                                       [](const Withheld& w) { return w.not_covered || w.healthy.hours_needed; });
+  if (undecided == d.withheld.end() && goes_beyond_healthy(d))
+    return fmt::format(
+        "Nothing stands out from the tolerance of the cell file, but more is not known of this recording: {}. {} "
+        "Whether anything is wrong is not decided. {}",
+        not_covered_reason(*d.healthy), error, there);
   if (undecided == d.withheld.end())
     return fmt::format(
         "{} Healthy recordings of this cell differ from the model as much, so no cause is named. Without "
         "them, {} would have been named. No action is needed.",
         error, name_of(d.withheld.front()));
-  const std::string action = undecided->not_covered
-                                 ? "Identify the cell again with healthy recordings there (bms identify --healthy)."
-                                 : "Add healthy recordings of this cell (bms identify --healthy).";
+  const std::string action =
+      undecided->not_covered ? there : "Add healthy recordings of this cell (bms identify --healthy).";
   return fmt::format(
       "Not enough healthy data to blame anything: {}. {} Without a comparison {} would have been named. {}",
       reason_of(*undecided, d), error, name_of(*undecided), action);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "diagnosis/charge_count.hpp"
+#include "diagnosis/healthy_coverage.hpp"
 #include "diagnosis/one_current.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "diagnosis/true_current.hpp"
@@ -21,31 +21,8 @@ double total_duration_s(const std::vector<PreparedRecording>& records) {
   return sum_s;
 }
 
-/// Share of the rows at charges, temperatures and currents of the healthy blocks.
-double covered_share(const std::vector<PreparedRecording>& records, const measurement::HealthyData& healthy,
-                     double capacity_ah) {
-  measurement::HealthyRange soc, temperature_c;
-  double largest_a = 0;
-  for (const measurement::HealthyBlock& b : healthy.blocks) {
-    soc.add(b.soc);
-    temperature_c.add(b.temperature_c);
-    if (b.current_a.known()) largest_a = std::max({largest_a, -b.current_a.low, b.current_a.high});
-  }
-  const auto within = [](const measurement::HealthyRange& range, double value, double beyond) {
-    return !range.known() || !std::isfinite(value) || (value >= range.low - beyond && value <= range.high + beyond);
-  };
-  double inside = 0, rows = 0;
-  for (const PreparedRecording& r : records) {
-    for_each_row(r, capacity_ah, [&](const CountedRow& row) {
-      const double at_c = r.temperature_c.empty() ? std::nan("") : r.temperature_c[row.k];
-      const bool covered = within(soc, row.soc, withhold_limits.soc_beyond) &&
-                           within(temperature_c, at_c, withhold_limits.temperature_beyond_k) &&
-                           std::abs(row.current_a) <= withhold_limits.current_beyond * largest_a;
-      inside += covered ? 1 : 0;
-      ++rows;
-    });
-  }
-  return rows > 0 ? inside / rows : 0;
+bool is_of_current(std::size_t m) {
+  return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
 }
 
 /// RMS error of a fit [V].
@@ -91,11 +68,11 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
       control_(control),
       scope_(scope),
       healthy_(healthy),
-      as_read_(covered_share(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
+      as_read_(coverage_of(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
       basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
       null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
 
-bool HealthyJudge::is_covered() const { return basis_.covered >= withhold_limits.covered_at_least; }
+bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }
 
 HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) const {
   const std::string cause =
@@ -117,27 +94,26 @@ std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
   return least;
 }
 
-double HealthyJudge::covered_by(const HypothesisFit& fit) const {
-  const auto is_of_current = [](std::size_t m) {
-    return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
-  };
+HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
   const std::vector<std::size_t> added = fit.hypothesis.added();
-  if (std::none_of(added.begin(), added.end(), is_of_current)) return 0;
-  if (error_of(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return 0;
-  return covered_share(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
+  if (std::none_of(added.begin(), added.end(), is_of_current)) return {};
+  if (error_of(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return {};
+  return coverage_of(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
 }
 
 void HealthyJudge::cover_true_current(const Survivors& found) {
   basis_.covered = as_read_;
   if (is_covered()) return;
-  basis_.covered = std::max(as_read_, covered_by(found.best));
+  const auto take_if_more = [&](HealthyCoverage c) {
+    if (c.share > basis_.covered.share) basis_.covered = std::move(c);
+  };
+  take_if_more(covered_by(found.best));
   const double reach = has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah)
                            ? thresholds.decision.tie_inseparable
                            : thresholds.decision.tie;
   for (const auto& [m, rivals] : found.rivals) {
     for (const HypothesisFit& rival : rivals) {
-      if (search_.score(rival) - search_.score(found.best) < reach)
-        basis_.covered = std::max(basis_.covered, covered_by(rival));
+      if (search_.score(rival) - search_.score(found.best) < reach) take_if_more(covered_by(rival));
     }
   }
 }
@@ -149,8 +125,20 @@ Survivors HealthyJudge::nothing_of(const Survivors& found) {
   return {control_, {}, {}, {}};
 }
 
+Survivors HealthyJudge::with_current_sensor(Survivors found) {
+  std::vector<std::size_t> sensor = scope_.searched;
+  std::erase_if(sensor, [](std::size_t m) { return !is_of_current(m); });
+  const std::vector<HypothesisFit> fits = search_.one_more(control_, sensor);
+  if (fits.empty() || search_.score(fits.front()) >= search_.score(found.best)) return found;
+  return eliminate(search_, likelihood_, control_, fits.front(), scope_);
+}
+
 Survivors HealthyJudge::without_withheld(Survivors found) {
   cover_true_current(found);
+  if (!is_covered()) {
+    found = with_current_sensor(std::move(found));
+    cover_true_current(found);
+  }
   if (!is_covered()) return nothing_of(found);
   for (bool removed = true; removed;) {
     removed = false;

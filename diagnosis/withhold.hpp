@@ -42,11 +42,14 @@ class HealthyJudge {
  private:
   /// Returns true if the healthy blocks stand for enough of the recordings.
   bool is_covered() const;
-  /// Share of the rows that healthy blocks stand for with the current sensor's error of a fit taken away; 0 if it has
-  /// none, or if it leaves more than healthy recordings show.
-  double covered_by(const HypothesisFit& fit) const;
+  /// What healthy blocks stand for with the current sensor's error of a fit taken away; nothing if it has none, or if
+  /// it leaves more than healthy recordings show.
+  HealthyCoverage covered_by(const HypothesisFit& fit) const;
   /// A recording beyond the healthy ones is covered if it is by the best fit or by a rival that equals it.
   void cover_true_current(const Survivors& found);
+  /// What is found if the current sensor is asked first: a recording beyond the healthy ones may be there because of
+  /// it, and its signature, which is linear, says little of a gain that doubles the reading.
+  Survivors with_current_sensor(Survivors found);
   /// Withholds everything: the healthy recordings were not there.
   Survivors nothing_of(const Survivors& found);
   HealthyComparison compare(std::size_t mechanism, double gain) const;
@@ -58,7 +61,7 @@ class HealthyJudge {
   const HypothesisFit& control_;
   Scope scope_;  ///< without what was withheld
   const measurement::HealthyData& healthy_;
-  double as_read_;  ///< share of the rows that healthy blocks stand for
+  HealthyCoverage as_read_;
   HealthyBasis basis_;
   HealthyNull null_;
   std::vector<Withheld> withheld_;

@@ -113,13 +113,29 @@ Json estimates_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
+Json range_of(const measurement::HealthyRange& r) {
+  return r.known() ? Json{number(r.low), number(r.high)} : Json(nullptr);
+}
+
+Json beyond_of(const diagnosis::HealthyCoverage& covered) {
+  Json list = Json::array();
+  for (const diagnosis::BeyondHealthy& b : covered.beyond)
+    list.push_back({{"axis", b.axis},
+                    {"share", number(b.share)},
+                    {"recorded", range_of(b.recorded)},
+                    {"healthy", range_of(b.healthy)}});
+  return list;
+}
+
 Json healthy_of(const diagnosis::Diagnosis& d) {
   const diagnosis::HealthyBasis h = d.healthy.value_or(diagnosis::HealthyBasis{});
   return {{"hours", number(h.hours)},
           {"recordings", h.recordings},
           {"blocks", h.blocks},
           {"false_alarm_rate", d.healthy ? number(h.false_alarm_rate) : Json(nullptr)},
-          {"covered", d.healthy ? number(h.covered) : Json(nullptr)}};
+          {"covered", d.healthy ? number(h.covered.share) : Json(nullptr)},
+          {"least_covered", d.healthy ? number(h.covered.least) : Json(nullptr)},
+          {"beyond", beyond_of(h.covered)}};
 }
 
 Json withheld_of(const diagnosis::Diagnosis& d) {

@@ -25,7 +25,8 @@ struct Knowledge<model::CurrentGain> : DefaultKnowledge<model::CurrentGain> {
   }
   static std::optional<std::string> not_testable(const TestConditions& c) { return needs_current(c); }
   static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts&) {
-    return {{-0.3}, {-0.12}, {-0.06}, {0.06}, {0.12}, {0.3}, {0.6}};
+    return {{-0.3}, {-0.2}, {-0.12}, {-0.06}, {0.06}, {0.12}, {0.18}, {0.25},
+            {0.3},  {0.36}, {0.43},  {0.5},   {0.6},  {0.7},  {0.8},  {0.9}};
   }
   /// Acts together with the calibration's own gain error.
   template <class S>

@@ -26,5 +26,32 @@ TEST(Credibility, ASkewWithinTheJitterOfAnEdgeIsNone) {
   }
 }
 
+PreparedRecording of_1200_s() {
+  PreparedRecording r;
+  std::vector<double>& time_s = r.time_s.edit();
+  for (int k = 0; k <= 1'200; ++k) time_s.push_back(k);
+  return r;
+}
+
+TEST(Credibility, AContactAtTheEndAloneIsAtTheEnd) {
+  constexpr std::size_t step = model::mechanism_index_of<model::ContactStep>,
+                        loose = model::mechanism_index_of<model::ContactIntermittent>,
+                        skew = model::mechanism_index_of<model::ChannelSkew>;
+  const auto changed_at = [](double onset_s) {
+    HypothesisFit f = with_first(step, 0.1);
+    f.hypothesis.settings.front().value[contact_onset] = onset_s;
+    return f;
+  };
+  EXPECT_TRUE(is_at_the_end(changed_at(1'101), step, {of_1200_s()}));
+  EXPECT_FALSE(is_at_the_end(changed_at(1'099), step, {of_1200_s()}));
+  EXPECT_FALSE(is_at_the_end(changed_at(1'101), step, {of_1200_s(), of_1200_s()})) << "it acts in all of the second";
+  HypothesisFit f = with_first(loose, 0.1);
+  f.hypothesis.bursts = {{{1'110, 1'120}, {1'130, 1'140}}};
+  EXPECT_TRUE(is_at_the_end(f, loose, {of_1200_s()}));
+  f.hypothesis.bursts.front().push_back({500, 510});
+  EXPECT_FALSE(is_at_the_end(f, loose, {of_1200_s()}));
+  EXPECT_FALSE(is_at_the_end(f, skew, {of_1200_s()}));
+}
+
 }  // namespace
 }  // namespace bms::diagnosis

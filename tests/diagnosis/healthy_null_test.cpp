@@ -274,7 +274,7 @@ TEST(DiagnoseWithHealthy, ASensorThatReadsTooMuchDoesNotHideBeyondTheHealthyCurr
   ASSERT_TRUE(names(d.verdict)) << name_of(d.verdict);
   EXPECT_EQ(model::catalogue[d.findings.front().setting.index].id, "current_gain");
   EXPECT_NEAR(d.findings.front().setting.value[0], 0.35, 0.06) << "the cell's relaxation is not in the model";
-  EXPECT_GE(d.healthy->covered, 0.9);
+  EXPECT_GE(d.healthy->covered.share, 0.9);
   // such a load on a cell that has another resistance, however, is not known
   for (HealthyBlock& b : options.healthy.blocks) b.current_a = {-5, 0};
   EXPECT_EQ(diagnose(test::table9(), {}, {pulsed_discharge(306, 0.01)}, options).verdict, Verdict::not_testable);
