@@ -16,7 +16,7 @@ using measurement::HealthyRange;
 constexpr const Thresholds::Healthy& coverage_limits = thresholds.healthy;
 
 /// One axis, and by how much a row may leave it.
-struct Axis {
+struct Dimension {
   BeyondHealthy of;
   double margin = 0;
 
@@ -27,8 +27,8 @@ struct Axis {
 };
 
 /// State of charge, current, temperature.
-std::array<Axis, 3> axes_of(const measurement::HealthyData& healthy) {
-  std::array<Axis, 3> axes;
+std::array<Dimension, 3> axes_of(const measurement::HealthyData& healthy) {
+  std::array<Dimension, 3> axes;
   auto& [soc, current, temperature] = axes;
   soc = {{"soc", 0, {}, {}}, coverage_limits.soc_beyond};
   temperature = {{"temperature_c", 0, {}, {}}, coverage_limits.temperature_beyond_k};
@@ -48,7 +48,7 @@ std::array<Axis, 3> axes_of(const measurement::HealthyData& healthy) {
 
 HealthyCoverage coverage_of(const std::vector<PreparedRecording>& records, const measurement::HealthyData& healthy,
                             double capacity_ah) {
-  std::array<Axis, 3> axes = axes_of(healthy);
+  std::array<Dimension, 3> axes = axes_of(healthy);
   HealthyCoverage c{0, 1, {}};
   double all_inside = 0, all_rows = 0;
   for (const PreparedRecording& r : records) {
@@ -72,7 +72,7 @@ HealthyCoverage coverage_of(const std::vector<PreparedRecording>& records, const
   }
   if (!(all_rows > 0)) return {};
   c.share = all_inside / all_rows;
-  for (Axis& axis : axes) {
+  for (Dimension& axis : axes) {
     axis.of.share /= all_rows;
     if (axis.of.share > 0) c.beyond.push_back(std::move(axis.of));
   }
