@@ -64,7 +64,7 @@ struct Numerics {
     std::size_t fits_with_own_noise = 3;  ///< of the candidates fitted, those that get their own noise
     int converged_rounds = 8;             ///< fits, one from where another has ended
     double converged = 0.5;               ///< gain below which the last of them has changed nothing
-    double another_minimum = 6;           ///< gain of one beside the last after which all comparisons are made anew
+    double another_minimum = 6;           ///< gain of one next to the last, after which all is compared again
     int elimination_rounds = 6, elimination_resumed = 2;
     double onset_reach = 40;     ///< the search for a contact's onset begins at the duration over this
     double onset_rows = 1.5;     ///< and ends at so many rows

@@ -5,6 +5,7 @@
 #include <limits>
 #include <set>
 
+#include "diagnosis/refit.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
 
@@ -60,59 +61,6 @@ bool alike(const NoiseModel& a, const NoiseModel& b) {
                      [&](const auto amplitude) { return near(a.*amplitude, b.*amplitude); });
 }
 
-/// Fitted again with the noise model that its own residual makes most probable.
-HypothesisFit own_noise_fit(LikelihoodModel& likelihood, const NoiseModel& nominal, HypothesisFit f) {
-  for (int round = 0; round < search_numerics.noise_rounds; ++round) {
-    double cost = 0;
-    const NoiseModel noise =
-        likelihood.likeliest_noise(likelihood.raw_residual(f.hypothesis, f.calibration), nominal, cost);
-    if (noise == f.noise) {
-      f.likeliest_cost = cost;
-      break;
-    }
-    likelihood.set_noise(noise);
-    f = likelihood.fit(f.hypothesis, f.calibration, numerics.fit.refit_iterations);
-  }
-  return f;
-}
-
-/// -2 log posterior with the noise model that the residual makes most probable, at its price.
-double total(const LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& f) {
-  double cost = 0;
-  if (f.likeliest_cost)
-    cost = *f.likeliest_cost;
-  else
-    likelihood.likeliest_noise(likelihood.raw_residual(f.hypothesis, f.calibration), nominal, cost);
-  return cost + f.cost - f.residual.squaredNorm();
-}
-
-/// Fitted on until nothing is gained any more, each time with base parameters' derivatives from where it stands.
-HypothesisFit fitted_on(LikelihoodModel& likelihood, const NoiseModel& nominal, HypothesisFit f) {
-  double sum = total(likelihood, nominal, f);
-  for (int round = 0; round < search_numerics.converged_rounds; ++round) {
-    likelihood.set_noise(f.noise);
-    likelihood.linearise(f.hypothesis, f.calibration);
-    HypothesisFit next = own_noise_fit(likelihood, nominal, likelihood.fit(f.hypothesis, f.calibration));
-    const double next_sum = total(likelihood, nominal, next), gained = sum - next_sum;
-    if (!(gained > 0)) break;
-    f = std::move(next);
-    sum = next_sum;
-    if (gained < search_numerics.converged) break;
-  }
-  return f;
-}
-
-/// The rest of a fit without a mechanism, fitted again from where it was. The model has the fit's noise.
-HypothesisFit fitted_without(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& f,
-                             std::size_t mechanism) {
-  HypothesisFit rest =
-      own_noise_fit(likelihood, nominal,
-                    likelihood.fit(without(f.hypothesis, mechanism), f.calibration, numerics.fit.reduced_iterations));
-  // where it decides whether the mechanism is needed, as far as the best was
-  const bool close = total(likelihood, nominal, rest) < total(likelihood, nominal, f) + search_limits.hopeless;
-  return close ? fitted_on(likelihood, nominal, std::move(rest)) : rest;
-}
-
 double& onset_of(Hypothesis& h) {
   return std::find_if(
              h.settings.begin(), h.settings.end(),
@@ -142,7 +90,8 @@ double fitted_error_v(const LikelihoodModel& likelihood, const HypothesisFit& f)
 
 double Search::score(const HypothesisFit& f) {
   const auto known = totals_.find(f.cost);
-  const double sum = known != totals_.end() ? known->second : (totals_[f.cost] = total(likelihood_, nominal_, f));
+  const double sum =
+      known != totals_.end() ? known->second : (totals_[f.cost] = posterior_cost(likelihood_, nominal_, f));
   return sum + price(f.hypothesis) - known_beforehand(likelihood_.facts(), f.hypothesis);
 }
 
@@ -150,7 +99,7 @@ void Search::learn_totals(const std::vector<HypothesisFit>& fits) {
   std::vector<double> totals(fits.size());
   measurement::in_parallel(fits.size(), [&](std::size_t k) {
     const auto known = totals_.find(fits[k].cost);
-    totals[k] = known != totals_.end() ? known->second : total(likelihood_, nominal_, fits[k]);
+    totals[k] = known != totals_.end() ? known->second : posterior_cost(likelihood_, nominal_, fits[k]);
   });
   for (std::size_t k = 0; k < fits.size(); ++k) totals_[fits[k].cost] = totals[k];
 }
