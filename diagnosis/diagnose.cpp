@@ -179,7 +179,8 @@ void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, 
   if (doubtful) {
     double foreign = 0;
     for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
-    if (foreign <= law_thresholds.law.clearly_more * (d.base_cost - d.best_cost)) return;
+    // a law cannot be missing where the causes leave nothing
+    if (foreign <= d.base_cost - d.best_cost || d.remaining <= 0) return;
     d.verdict = Verdict::unknown;
   }
   d.law = learn_law_term(likelihood, nominal, std::move(laws));

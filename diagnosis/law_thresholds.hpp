@@ -23,9 +23,6 @@ struct EvidenceThresholds {
   double least = 20;        ///< of a law: healthy recordings have less
   std::size_t doubted = 2;  ///< so many causes, named without healthy recordings, are doubted: a file that lacks more
                             ///< is plain, and whatever it lacks looks foreign as well
-  /// Times the gain of causes that a law must explain to make them doubtful: its gain is linear, theirs is not, and of
-  /// a large effect both explain all.
-  double clearly_more = 1.1;
   double narrowest = 1.0 / 64, widest = 4;  ///< prior of a law's columns, times the free error
   /// [s] time constants of the load before; a memory of the load is fitted from the slow ones.
   std::array<double, 3> fast_s = {4, 15, 60}, slow_s = {250, 1'000, 4'000};
