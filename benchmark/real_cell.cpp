@@ -1,7 +1,10 @@
 #include "benchmark/real_cell.hpp"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <filesystem>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -17,7 +20,9 @@ namespace {
 
 using measurement::Recording;
 
-constexpr const char *calibration_part = "semi_real_calibration.csv", *test_part = "semi_real_test.csv";
+/// Parts of a recording, in files of this process alone: several programs may run at once.
+const std::string calibration_part = fmt::format("calibration_{}.csv", getpid()),
+                  test_part = fmt::format("test_{}.csv", getpid());
 
 /// Rows of a recording from `first` on.
 Recording part(const Recording& r, std::size_t first, std::size_t count) {
@@ -86,7 +91,7 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   std::string test = path(set.test);
   if (set.test.empty()) {
     const Recording whole = files::read_recording(path(set.calibration.front()));
-    const auto save = [&](const char* name, std::size_t first, std::size_t end) {
+    const auto save = [&](const std::string& name, std::size_t first, std::size_t end) {
       files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
       return (folder / name).string();
     };
@@ -112,7 +117,7 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   p.cell = *workflow::identify_cell(options).cell_file;
   if (set.cells_in_parallel > 1) workflow::scale_to(set.cells_in_parallel * p.cell.parameters.capacity_ah, p.cell);
   p.test = workflow::read_for_diagnosis(test, {}, p.cell);
-  for (const char* name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
+  for (const std::string& name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
   return p;
 }
 

@@ -44,15 +44,41 @@ std::array<Dimension, 3> axes_of(const measurement::HealthyData& healthy) {
   return axes;
 }
 
+/// Share that is covered, of the rows or of the squared current, whichever is less: what a model lacks in its
+/// resistances shows in proportion to the current, and a few large ones may carry most of it.
+class CoveredShare {
+ public:
+  void add(double current_a, bool covered) {
+    const double square = current_a * current_a;
+    (covered ? inside_ : outside_) += 1;
+    (covered ? inside_square_ : outside_square_) += square;
+  }
+  void add(const CoveredShare& other) {
+    inside_ += other.inside_;
+    outside_ += other.outside_;
+    inside_square_ += other.inside_square_;
+    outside_square_ += other.outside_square_;
+  }
+  double rows() const { return inside_ + outside_; }
+  double share() const {
+    if (!(rows() > 0)) return 0;
+    const double square = inside_square_ + outside_square_, of_rows = inside_ / rows();
+    return square > 0 ? std::min(of_rows, inside_square_ / square) : of_rows;
+  }
+
+ private:
+  double inside_ = 0, outside_ = 0, inside_square_ = 0, outside_square_ = 0;
+};
+
 }  // namespace
 
 HealthyCoverage coverage_of(const std::vector<PreparedRecording>& records, const measurement::HealthyData& healthy,
                             double capacity_ah) {
   std::array<Dimension, 3> axes = axes_of(healthy);
   HealthyCoverage c{0, 1, {}};
-  double all_inside = 0, all_rows = 0;
+  CoveredShare all;
   for (const PreparedRecording& r : records) {
-    double inside = 0;
+    CoveredShare one;
     for_each_row(r, capacity_ah, [&](const CountedRow& row) {
       const double at_c = r.temperature_c.empty() ? std::nan("") : r.temperature_c[row.k];
       const std::array<double, 3> values = {row.soc, std::abs(row.current_a), at_c};
@@ -63,17 +89,15 @@ HealthyCoverage coverage_of(const std::vector<PreparedRecording>& records, const
         axes[k].of.share += within ? 0 : 1;
         covered = covered && within;
       }
-      inside += covered ? 1 : 0;
+      one.add(row.current_a, covered);
     });
-    const auto rows = static_cast<double>(r.size());
-    c.least = std::min(c.least, rows > 0 ? inside / rows : 0);
-    all_inside += inside;
-    all_rows += rows;
+    c.least = std::min(c.least, one.share());
+    all.add(one);
   }
-  if (!(all_rows > 0)) return {};
-  c.share = all_inside / all_rows;
+  if (!(all.rows() > 0)) return {};
+  c.share = all.share();
   for (Dimension& axis : axes) {
-    axis.of.share /= all_rows;
+    axis.of.share /= all.rows();
     if (axis.of.share > 0) c.beyond.push_back(std::move(axis.of));
   }
   std::stable_sort(c.beyond.begin(), c.beyond.end(), [](const auto& a, const auto& b) { return a.share > b.share; });

@@ -342,7 +342,7 @@ struct Thresholds {
     double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
     double temperature_beyond_k = 5;  ///< [K]
     double current_beyond = 1.25;     ///< times their largest current
-    double covered_at_least = 0.5;    ///< share of a recording's rows that the healthy blocks stand for
+    double covered_at_least = 0.5;    ///< share of a recording's rows and squared current that the healthy blocks stand for
     double error_times = 1.5;         ///< of the RMS error of healthy recordings: a few know it to a third
     double error_at_least_v = 5e-4;   ///< [V]
     double learned_within = 0.95;     ///< share of a recording's rows where healthy ones were, from which their error

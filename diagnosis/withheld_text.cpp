@@ -35,8 +35,8 @@ std::string not_covered_reason(const HealthyBasis& healthy) {
   std::vector<std::string> beyond;
   for (const BeyondHealthy& b : healthy.covered.beyond) beyond.push_back(text_of(b));
   return fmt::format(
-      "only {:.0f} % of the recording lies at states of charge, temperatures and currents of the healthy "
-      "recordings{}{}",
+      "only {:.0f} % of the recording, of its rows or of their squared current, lies at states of charge, temperatures "
+      "and currents of the healthy recordings{}{}",
       100 * healthy.covered.least, beyond.empty() ? "" : ": ", joined(beyond, "and"));
 }
 

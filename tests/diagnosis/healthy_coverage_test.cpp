@@ -36,13 +36,24 @@ TEST(HealthyCoverage, SaysWhereAndHowFarARecordingGoesBeyond) {
   EXPECT_EQ(here.share, 1);
   EXPECT_EQ(here.least, 1);
   EXPECT_TRUE(here.beyond.empty());
-  const HealthyCoverage warmer = coverage_of({recorded_at(25, 1), recorded_at(40, 2)}, healthy_at(25), 6);
+  const HealthyCoverage warmer = coverage_of({recorded_at(25, 1), recorded_at(40, 1)}, healthy_at(25), 6);
   EXPECT_NEAR(warmer.share, 0.5, 0.01);
   EXPECT_EQ(warmer.least, 0) << "the second recording";
   ASSERT_EQ(warmer.beyond.size(), 1);
   EXPECT_EQ(warmer.beyond.front().axis, "temperature_c");
   EXPECT_EQ(warmer.beyond.front().recorded.high, 40);
   EXPECT_EQ(warmer.beyond.front().healthy.high, 27);
+}
+
+TEST(HealthyCoverage, AFewLargeCurrentsCarryMostOfARecording) {
+  PreparedRecording r = recorded_at(25, 1);
+  std::vector<double>& current_a = r.current_a.edit();
+  for (std::size_t k = 0; k < current_a.size(); ++k) current_a[k] = k % 20 == 0 ? -60 : 5;
+  const HealthyCoverage c = coverage_of({r}, healthy_at(25), 6);
+  EXPECT_NEAR(c.share, 0.117, 0.01) << "19 * 25 of 19 * 25 + 3600 A^2, though 95 % of the rows";
+  EXPECT_EQ(c.least, c.share);
+  ASSERT_EQ(c.beyond.size(), 1);
+  EXPECT_NEAR(c.beyond.front().share, 0.05, 0.01);
 }
 
 TEST(HealthyCoverage, NothingFoundElsewhereIsNotNoMismatch) {
