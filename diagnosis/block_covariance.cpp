@@ -5,7 +5,10 @@
 
 #include <Eigen/Cholesky>
 
+#include "diagnosis/fit_parameters.hpp"
+#include "diagnosis/numerics.hpp"
 #include "diagnosis/products.hpp"
+#include "diagnosis/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -29,6 +32,40 @@ Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit
   Columns columns = likelihood.derivatives(fit.hypothesis, fit.calibration, refs);
   for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) *= sigmas[static_cast<std::size_t>(j)];
   return columns;
+}
+
+/// 1 / variance of what is known of each estimated parameter before any voltage is looked at; 0: nothing.
+Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  const FitParameters parameters(likelihood.cell(), fit.hypothesis);
+  Hypothesis at = fit.hypothesis;
+  Eigen::VectorXd precision = Eigen::VectorXd::Zero(parameters.size());
+  for (Eigen::Index j = 0; j < parameters.size(); ++j) {
+    const double sigma = parameters.known_within(j, parameters.of(at, j));
+    if (sigma > 0) precision[j] = 1 / (sigma * sigma);
+  }
+  return precision;
+}
+
+/// Covariance from what the data say, as uncertain in each direction as their pulls are there, but not less than by the
+/// covariance of the fit; and from the prior, which the error of the model leaves as it is.
+/// pulls: covariance of the data's pulls. prior: precision of each parameter.
+Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior,
+                           const Eigen::MatrixXd& pulls) {
+  // in coordinates in which the covariance of the fit is 1: data + rest = 1
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  if (root.info() != Eigen::Success) return covariance;
+  const Eigen::MatrixXd l = root.matrixL();
+  const Eigen::MatrixXd rest = l.transpose() * prior.asDiagonal() * l;
+  const SymmetricEigen known = symmetric_eigen(rest);
+  const Eigen::VectorXd share = (1 - known.values.array()).cwiseMax(numerics.fit.ridge);  // known from data
+  const Eigen::MatrixXd data_root = known.vectors * share.cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd back = share.cwiseSqrt().cwiseInverse().asDiagonal() * known.vectors.transpose();
+  const Eigen::MatrixXd turned = back * l.transpose();
+  const SymmetricEigen spread = symmetric_eigen(turned * pulls * turned.transpose());
+  const Eigen::VectorXd weaker = spread.values.cwiseMax(1).cwiseInverse();
+  const Eigen::MatrixXd data = data_root * spread.vectors;
+  const Eigen::MatrixXd precision = data * weaker.asDiagonal() * data.transpose() + rest;
+  return l * precision.ldlt().solve(Eigen::MatrixXd(l.transpose()));
 }
 
 }  // namespace
@@ -60,21 +97,17 @@ Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const Hypoth
   Eigen::MatrixXd all = blocks / (blocks - 1) * pulls + follow.transpose() * follow;
   // the file's mechanisms are known to their standard deviations, and together as well as these recordings show
   if (file.cols() > 0) all += with_file * known.ldlt().solve(with_file.transpose());
-  return fit.covariance * all * fit.covariance;
+  return with_prior(fit.covariance, prior_precision(likelihood, fit), all);
 }
 
 void include_model_error(const LikelihoodModel& likelihood, HypothesisFit& fit) {
   const std::vector<ParameterRef> sought = fit.hypothesis.sought();
-  if (sought.empty()) return;
-  const Eigen::MatrixXd wide = block_covariance(likelihood, fit);
-  Eigen::VectorXd times(wide.rows());
-  for (Eigen::Index j = 0; j < wide.rows(); ++j) {
-    const double ratio = wide(j, j) / fit.covariance(j, j);
-    times[j] = std::isfinite(ratio) ? std::sqrt(std::max(ratio, 1.0)) : 1;
-    const ParameterRef& p = sought[static_cast<std::size_t>(j)];
-    fit.hypothesis.settings[p.setting].deviation[p.parameter] *= times[j];
+  if (sought.empty() || !fit.covariance.allFinite()) return;
+  fit.covariance = block_covariance(likelihood, fit);
+  for (std::size_t j = 0; j < sought.size(); ++j) {
+    const auto k = static_cast<Eigen::Index>(j);
+    fit.hypothesis.settings[sought[j].setting].deviation[sought[j].parameter] = std::sqrt(fit.covariance(k, k));
   }
-  fit.covariance = times.asDiagonal() * fit.covariance * times.asDiagonal();
 }
 
 }  // namespace bms::diagnosis

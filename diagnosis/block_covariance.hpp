@@ -24,12 +24,13 @@ void for_each_block(std::size_t size, Block&& block) {
   }
 }
 
-/// Covariance of the estimated parameters of a fit, the base parameters marginalised, from the pulls of equal blocks of
-/// time in each recording. The likelihood has the noise model of the fit.
+/// Covariance of the estimated parameters of a fit, the base parameters marginalised. What the data say is in each
+/// direction as uncertain as the pulls of equal blocks of time in each recording are, but not less than by the
+/// covariance of the fit; what is known before any voltage is looked at stays known. The likelihood has the noise model
+/// of the fit.
 Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
-/// Raises the standard deviations of the settings, and the covariance, to those of block_covariance() where it is
-/// larger.
+/// Replaces covariance and standard deviations by those of block_covariance().
 void include_model_error(const LikelihoodModel& likelihood, HypothesisFit& fit);
 
 }  // namespace bms::diagnosis

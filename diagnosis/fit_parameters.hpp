@@ -42,6 +42,9 @@ class FitParameters {
 
   /// Of a shape in its logarithm.
   PriorDistance prior_distance(Eigen::Index j, double v) const;
+  /// Standard deviation of what is known of a parameter at a value v, in its unit; 0: nothing. That large strengths are
+  /// rare is not counted: it says little of which one it is.
+  double known_within(Eigen::Index j, double v) const;
   /// -2 log prior of all.
   double prior(Hypothesis& h) const;
 

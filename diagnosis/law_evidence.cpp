@@ -6,12 +6,11 @@
 #include <span>
 #include <string_view>
 
-#include <Eigen/Eigenvalues>
-
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/generic_columns.hpp"
 #include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/residual_projection.hpp"
+#include "diagnosis/symmetric_eigen.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
@@ -160,9 +159,9 @@ Columns law_columns(const LikelihoodModel& likelihood, const HypothesisFit& fit)
 
 /// With the width of the prior that has the most evidence.
 double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(gram);
-  const Eigen::VectorXd power = eigen.eigenvalues().cwiseMax(0.0),
-                        along = (eigen.eigenvectors().transpose() * toward).array().square();
+  const SymmetricEigen eigen = symmetric_eigen(gram);
+  const Eigen::VectorXd power = eigen.values.cwiseMax(0.0),
+                        along = (eigen.vectors.transpose() * toward).array().square();
   double best = 0;
   for (double width = evidence_limits.narrowest; width <= evidence_limits.widest; width *= 2) {
     const double s2 = width * width;

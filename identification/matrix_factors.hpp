@@ -1,4 +1,4 @@
-// Factors of dense matrices. Each takes 5 to 25 s to compile inside Eigen, so they are compiled once, here.
+// Factors of dense matrices. Each takes 5 to 8 s to compile inside Eigen, so they are compiled once, here.
 #pragma once
 
 #include <Eigen/Core>

@@ -4,7 +4,8 @@
 #include <cmath>
 
 #include <fmt/format.h>
-#include <Eigen/Eigenvalues>
+
+#include "diagnosis/symmetric_eigen.hpp"
 
 namespace bms::proof {
 
@@ -82,17 +83,17 @@ std::vector<diagnosis::Hypothesis> one_sigma_away(const diagnosis::Diagnosis& d,
     if (catalogue[d.extended.settings[sought[j].setting].index].id == mechanism)
       rows.push_back(static_cast<Eigen::Index>(j));
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> axes(Eigen::MatrixXd(d.covariance(rows, rows)));
+  const diagnosis::SymmetricEigen axes = diagnosis::symmetric_eigen(d.covariance(rows, rows));
   std::vector<diagnosis::Hypothesis> list;
-  for (Eigen::Index axis = 0; axis < axes.eigenvalues().size(); ++axis) {
-    const double sigma = std::sqrt(std::max(axes.eigenvalues()[axis], 0.0));
+  for (Eigen::Index axis = 0; axis < axes.values.size(); ++axis) {
+    const double sigma = std::sqrt(std::max(axes.values[axis], 0.0));
     diagnosis::Hypothesis& h = list.emplace_back(d.extended);
     for (std::size_t k = 0; k < rows.size(); ++k) {
       const diagnosis::ParameterRef& s = sought[static_cast<std::size_t>(rows[k])];
       model::MechanismSetting& setting = h.settings[s.setting];
       const model::Parameter& p = catalogue[setting.index].parameter[s.parameter];
       double& value = setting.value[s.parameter];
-      value = std::clamp(value + sigma * axes.eigenvectors()(static_cast<Eigen::Index>(k), axis),
+      value = std::clamp(value + sigma * axes.vectors(static_cast<Eigen::Index>(k), axis),
                          p.lower(d.cell.capacity_ah), p.upper(d.cell.capacity_ah));
     }
   }
