@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include <gmock/gmock.h>
+#include <Eigen/LU>
 
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/healthy_block.hpp"
@@ -299,6 +300,27 @@ TEST(DiagnoseWithHealthy, TheStandardDeviationContainsTheErrorOfTheModel) {
   const auto drive = test::drive(1, 205);
   EXPECT_LT(fitted(test::recorded(drive, 0.7, 205, [](std::size_t, double a, double) { return 0.003 * a; })), 1.8);
   EXPECT_GT(fitted(test::recorded(drive, 0.7, 205, not_in_the_model(0.003))), 2.5);
+}
+
+TEST(DiagnoseWithHealthy, TheErrorOfTheModelLeavesWhatIsKnownWithoutTheVoltage) {
+  // 0.3 K below the reference the voltage says little of the energies, and with the error of the model next to nothing
+  MechanismSetting cold = model::default_setting(model::mechanism_index("temperature_resistance"), test::table9());
+  cold.value[0] = 40'000;
+  cold.value[1] = 45'000;
+  cold.value[3] = 0.5;
+  PreparedRecording r = test::recorded(test::drive(1, 206), 0.7, 206, not_in_the_model(0.004));
+  r.temperature_c.edit().assign(r.size(), 24.7);
+  model::CellParameters<> cell = test::table9();
+  cell.tolerance.resistance_fraction = 0.001;  // otherwise the tolerance is the larger part
+  const LikelihoodModel likelihood = likelihood_model_of(cell, {}, {r});
+  HypothesisFit fit = likelihood.fit(with(likelihood.base(), cold));
+  const Eigen::MatrixXd plain = fit.covariance;
+  include_model_error(likelihood, fit);
+  const MechanismSetting& s = fit.hypothesis.settings.back();
+  EXPECT_LE(s.deviation[0], 1.0001e4);
+  EXPECT_LE(s.deviation[1], 1.5001e4);
+  EXPECT_GT(fit.covariance.determinant(), 4 * plain.determinant()) << "what the data say is less certain";
+  for (Eigen::Index j = 0; j < plain.rows(); ++j) EXPECT_GE(fit.covariance(j, j), 0.999 * plain(j, j));
 }
 
 TEST(DiagnoseWithHealthy, WithoutAnyUsableBlockNothingIsBlamed) {
