@@ -56,7 +56,8 @@ std::string figures_of(const diagnosis::Diagnosis& d) {
 model::CellParameters<> cell_of(const truth::CalibratedCell& c) {
   model::CellParameters<> p;
   p.capacity_ah = c.capacity_ah;
-  p.limits = {2.0, 3.65, 2 * c.capacity_ah, 10 * c.capacity_ah, -20, 60};
+  constexpr double most_a = 2'000;  // that a cell file accepts: a cell of 280 Ah would have more
+  p.limits = {2.0, 3.65, std::min(2 * c.capacity_ah, most_a), std::min(10 * c.capacity_ah, most_a), -20, 60};
   for (const double soc : c.ocv_soc) p.ocv.soc.push_back(soc);
   for (const double v : c.ocv_b0_v) p.ocv.b0_v.push_back(v);
   for (const double v : c.ocv_b1_v) p.ocv.b1_v.push_back(v);

@@ -87,12 +87,17 @@ bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<
 }
 
 bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
-  if (mechanism != model::mechanism_index_of<model::CapacityChange>) return false;
+  constexpr std::size_t capacity = model::mechanism_index_of<model::CapacityChange>;
   const auto growth = [&](std::size_t of) {
     const MechanismSetting* s = f.hypothesis.find(of);
     return s == nullptr ? 0 : s->value[0];
   };
-  return f.hypothesis.find(mechanism)->value[0] > credible_limits.capacity_lost_alone &&
+  if (mechanism == model::mechanism_index_of<model::OcvShape>) {
+    const auto& slide = f.hypothesis.find(mechanism)->value;
+    return (slide[0] - slide[1]) / credible_limits.slides_apart_soc - growth(capacity) > credible_limits.stages_closer;
+  }
+  if (mechanism != capacity) return false;
+  return growth(capacity) > credible_limits.capacity_lost_alone &&
          growth(model::mechanism_index_of<model::ResistanceGrowth>) < credible_limits.resistance_grown &&
          growth(model::mechanism_index_of<model::PolarisationGrowth>) < credible_limits.resistance_grown;
 }

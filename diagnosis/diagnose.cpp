@@ -169,18 +169,39 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
   return limits_of(sigmas, adequacy.residual, capacity_ah, stands_out, gain_of_size);
 }
 
+/// What is left of the judgement if nothing may be named: whether something else is there, in more than one place.
+Adequacy without_causes(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& control) {
+  Survivors nothing{control, {}, {}, {}};
+  Adequacy adequacy = judge(likelihood, nominal, control, nothing);
+  if (adequacy.residual.only_place) adequacy.unknown = false;
+  return adequacy;
+}
+
+/// Without healthy recordings: something unknown is there if the voltage is read in leaps, which no cause makes, or if
+/// nothing was found but a law has changed. laws: filled in if they were asked for.
+void find_unknown(const LikelihoodModel& likelihood, const NoiseModel& nominal, Adequacy& adequacy,
+                  std::vector<LawEvidence>& laws) {
+  const std::vector<PreparedRecording>& records = likelihood.records();
+  if (std::any_of(records.begin(), records.end(), follows_in_leaps)) adequacy.unknown = true;
+  if (adequacy.found || adequacy.unknown) return;
+  laws = law_evidence(likelihood, nominal);
+  adequacy.unknown = a_law_has_changed(laws);
+}
+
 /// Where an unknown cause sits, and the cell with a term for it. One or two causes that are named although a law that
 /// no mechanism changes explains more are unknown. A file that lacks three is plain: whatever it lacks looks foreign as
 /// well. With healthy recordings the catalogue is judged by them.
-void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
+/// laws: by the cell file as it is, if known already.
+void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy,
+                  std::vector<LawEvidence> laws, Diagnosis& d) {
   const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.law.doubted;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
-  std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
+  if (laws.empty()) laws = law_evidence(likelihood, nominal);
   if (doubtful) {
     double foreign = 0;
     for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
-    // a law cannot be missing where the causes leave nothing
-    if (foreign <= d.base_cost - d.best_cost || d.remaining <= 0) return;
+    // what the causes leave counts against them; where it is nothing, no law can be missing
+    if (foreign <= d.base_cost - d.best_cost - d.remaining - thresholds.decision.tie || d.remaining <= 0) return;
     d.verdict = Verdict::unknown;
   }
   d.law = learn_law_term(likelihood, nominal, std::move(laws));
@@ -219,12 +240,15 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
-  if (adequacy.only_place && !judge_healthy && !options.learns) {
-    d.withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains,
-                             options.false_alarm_rate);
-    survivors = {control, {}, {}, {}};
-    adequacy.found = adequacy.unknown = false;
-    likelihood.set_noise(control.noise);
+  std::vector<LawEvidence> laws;
+  if (!judge_healthy && !options.learns) {
+    if (adequacy.only_place) {
+      d.withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains,
+                               options.false_alarm_rate);
+      survivors = {control, {}, {}, {}};
+      adequacy = without_causes(likelihood, search.nominal_noise(), control);
+    }
+    find_unknown(likelihood, search.nominal_noise(), adequacy, laws);
   }
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   d.unknown_gain = unknown_gain(adequacy.residual);
@@ -249,7 +273,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
   add_numbers(adequacy, search.nominal_noise(), d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, std::move(laws), d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);

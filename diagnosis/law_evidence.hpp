@@ -16,17 +16,24 @@
 namespace bms::diagnosis {
 
 struct LawEvidence {
-  const char* law;         ///< as LawTerm::law; "": a function of the time, which every law is
-  const char* depends_on;  ///< soc, current, time, temperature, voltage
-  double gain = 0;         ///< the evidence
-  double foreign = 0;      ///< gain of the best form that no mechanism of the catalogue has
+  const char* law;            ///< as LawTerm::law; "": a function of the time, which every law is
+  const char* depends_on;     ///< soc, current, time, temperature, voltage
+  double gain = 0;            ///< the evidence
+  double foreign = 0;         ///< gain of the best form that no mechanism of the catalogue has
+  bool in_one_place = false;  ///< all that speaks for it lies in one place of the recordings (one_place.hpp)
 };
 
 /// The largest first; the best form of each law.
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
-/// Returns true if the voltage's reading never moves by less than several of the steps that it can resolve: it stands
-/// still until the voltage has left it by a threshold.
+/// The law with the most evidence; nullptr if none has enough to be named.
+const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws);
+
+/// Returns true if a law has so much evidence, in more than one place, that something unknown has changed it.
+bool a_law_has_changed(const std::vector<LawEvidence>& laws);
+
+/// Returns true if the voltage's reading often stands still, and never moves by less than several of the steps that it
+/// can resolve: it stands until the voltage has left it by a threshold.
 bool follows_in_leaps(const PreparedRecording& r);
 
 }  // namespace bms::diagnosis

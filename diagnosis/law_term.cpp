@@ -222,9 +222,8 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
     term.depends_on = {"voltage"};
     return term;
   }
-  const auto most =
-      std::find_if(term.laws.begin(), term.laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  if (most == term.laws.end() || most->gain < law_thresholds.law.least) return std::nullopt;
+  const LawEvidence* most = likeliest_law(term.laws);
+  if (most == nullptr) return std::nullopt;
   term.law = most->law;
   term.depends_on = {most->depends_on};
   for (const TableLaw& law : table_laws) {

@@ -21,6 +21,7 @@ struct TermThresholds {
 /// The evidence of a law (law_evidence.hpp).
 struct EvidenceThresholds {
   double least = 20;        ///< of a law: healthy recordings have less
+  double alone = 30;        ///< of a law, from which something unknown is there although nothing else shows it
   std::size_t doubted = 2;  ///< so many causes, named without healthy recordings, are doubted: a file that lacks more
                             ///< is plain, and whatever it lacks looks foreign as well
   double narrowest = 1.0 / 64, widest = 4;  ///< prior of a law's columns, times the free error
@@ -35,6 +36,8 @@ struct EvidenceThresholds {
 /// A reading that follows in leaps.
 struct LeapThresholds {
   std::size_t moves = 30;        ///< of the reading, at least
+  double stands = 0.2;           ///< share of the rows, at least, in which it stands still. A cell under a square wave
+                                 ///< that is read once in each half moves by much in every row (NASA B0025)
   double least_quantile = 0.02;  ///< that counts as the smallest leap
   double of_median = 0.3;        ///< the smallest leap exceeds this share of the median move,
   double steps = 2.5;            ///< and so many steps of the resolution

@@ -42,28 +42,34 @@ bool goes_and_comes(const LikelihoodModel& likelihood, const Hypothesis& h) {
 
 }  // namespace
 
-std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
-                                      const HypothesisFit& fit) {
+std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const Eigen::VectorXd& before,
+                                      const Eigen::VectorXd& after, double bent) {
   double total = 0, most = 0;
   PlaceOfGain place;
-  Eigen::Index before = 0;
+  Eigen::Index start = 0;
   for (std::size_t r = 0; r < likelihood.records().size(); ++r) {
     const std::size_t rows = likelihood.records()[r].size();
     for_each_block(rows, [&](Eigen::Index first, Eigen::Index count) {
-      const double gain = control.residual.segment(before + first, count).squaredNorm() -
-                          fit.residual.segment(before + first, count).squaredNorm();
+      const double gain =
+          before.segment(start + first, count).squaredNorm() - after.segment(start + first, count).squaredNorm();
       total += gain;
       if (gain <= most) return;
       most = gain;
       place = {r, static_cast<std::size_t>(first), static_cast<std::size_t>(count)};
     });
-    before += static_cast<Eigen::Index>(rows);
+    start += static_cast<Eigen::Index>(rows);
   }
   if (most <= thresholds.decision.in_one_place * total) return std::nullopt;
+  if ((1 - most / total) * (total + bent) >= thresholds.decision.detected) return std::nullopt;
+  return place;
+}
+
+std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
+                                      const HypothesisFit& fit) {
   // base parameters that need not bend any more have no place: their part goes with what is explained where
   const double bent = std::max(control.calibration.squaredNorm() - fit.calibration.squaredNorm(), 0.0);
-  if ((1 - most / total) * (total + bent) >= thresholds.decision.detected) return std::nullopt;
-  if (goes_and_comes(likelihood, fit.hypothesis)) return std::nullopt;
+  const std::optional<PlaceOfGain> place = only_place(likelihood, control.residual, fit.residual, bent);
+  if (place && goes_and_comes(likelihood, fit.hypothesis)) return std::nullopt;
   return place;
 }
 

@@ -26,6 +26,11 @@ struct PlaceOfGain {
 std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
                                       const HypothesisFit& fit);
 
+/// The same of a whitened residual without and with columns that could follow anything. bent: squares of base
+/// parameters that need not bend any more.
+std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const Eigen::VectorXd& before,
+                                      const Eigen::VectorXd& after, double bent);
+
 /// What a hypothesis adds, not to be named because of its only place. gains: by mechanism.
 std::vector<Withheld> withheld_at(const LikelihoodModel& likelihood, const PlaceOfGain& place, const Hypothesis& h,
                                   const std::map<std::size_t, double>& gains, double false_alarm_rate);

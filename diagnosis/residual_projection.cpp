@@ -34,11 +34,22 @@ Eigen::MatrixXd ResidualProjection::along(const Columns& columns) const {
 }
 
 ResidualProjection::Products::Products(const ResidualProjection& by, const Columns& columns)
-    : columns_(&columns),
+    : by_(&by),
+      columns_(&columns),
       cross_(by.along(columns)),
       solved_(by.normal_.solve(cross_)),
       gram_(squared(columns) - cross_.transpose() * solved_),
       toward_(columns.transpose() * by.residual_ - cross_.transpose() * by.pulled_) {}
+
+Eigen::VectorXd ResidualProjection::Products::residual_with(Eigen::Index first,
+                                                            const Eigen::VectorXd& strengths) const {
+  const Eigen::VectorXd known = by_->pulled_ - solved_.middleCols(first, strengths.size()) * strengths;
+  const Eigen::Index bases = by_->base().cols();
+  Eigen::VectorXd left =
+      by_->residual_ - by_->base() * known.head(bases) - columns_->middleCols(first, strengths.size()) * strengths;
+  if (by_->own_.cols() > 0) left -= by_->own_ * known.tail(by_->own_.cols());
+  return left;
+}
 
 Eigen::MatrixXd ResidualProjection::Products::with(const Products& other) const {
   return products(*columns_, *other.columns_) - cross_.transpose() * other.solved_;

@@ -25,10 +25,13 @@ class ResidualProjection {
     Eigen::MatrixXd gram(Eigen::Index first, Eigen::Index count) const {
       return gram_.block(first, first, count, count);
     }
+    /// The residual with strengths of `count` neighbouring columns, the known parameters following: to first order.
+    Eigen::VectorXd residual_with(Eigen::Index first, const Eigen::VectorXd& strengths) const;
     /// Of these columns (rows of the result) and others.
     Eigen::MatrixXd with(const Products& other) const;
 
    private:
+    const ResidualProjection* by_;
     const Columns* columns_;
     Eigen::MatrixXd cross_, solved_;  ///< known columns' products with them, and the known parameters that follow
     Eigen::MatrixXd gram_;

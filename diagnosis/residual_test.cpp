@@ -23,7 +23,15 @@ struct Best {
   double gain = 0;
   const char* family = "";
   Eigen::VectorXd explained_v;  ///< by row
+  std::optional<PlaceOfGain> only_place = std::nullopt;
 };
+
+/// Where columns of some strengths gain, if that is one place.
+std::optional<PlaceOfGain> place_of(const LikelihoodModel& likelihood, const ResidualProjection::Products& products,
+                                    Eigen::Index first, const Eigen::VectorXd& strengths) {
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(strengths.size());
+  return only_place(likelihood, products.residual_with(first, none), products.residual_with(first, strengths), 0);
+}
 
 /// Each family by itself, its columns with a standard normal prior.
 void test_families(const LikelihoodModel& likelihood, const HypothesisFit& fit, const ResidualProjection& projection,
@@ -42,7 +50,8 @@ void test_families(const LikelihoodModel& likelihood, const HypothesisFit& fit, 
     const double freedom = solver.solve(own_gram).trace(),
                  gain = toward.dot(x) - residual_limits.gain_per_freedom * freedom;
     if (gain <= best.gain) continue;
-    best = {gain, f.depends_on, generic.columns.middleCols(f.first, f.count) * x};
+    best = {gain, f.depends_on, generic.columns.middleCols(f.first, f.count) * x,
+            place_of(likelihood, products, f.first, x)};
   }
 }
 
@@ -114,6 +123,7 @@ ResidualTest test_residual(const LikelihoodModel& likelihood, const HypothesisFi
   ResidualTest found;
   found.gain = best.gain;
   found.family = best.family;
+  found.only_place = best.only_place;
   // checks of an instrument say nothing of how well the cell is explained
   test_distribution(fit.residual.head(static_cast<Eigen::Index>(likelihood.readings())), found);
   Eigen::Index row = 0;

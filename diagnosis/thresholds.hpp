@@ -231,6 +231,9 @@ struct Thresholds {
     double own_sigmas = 2;          ///< a strength within so many of its standard deviations of none is not named
     double capacity_lost_alone = 0.3;  ///< loss of capacity that no ageing makes without
     double resistance_grown = 0.1;     ///< so much more resistance or polarisation
+    double stages_closer = 0.15;       ///< by which the stages of the OCV lie closer together without
+                                       ///< so much less capacity: no electrode is used less otherwise
+    double slides_apart_soc = 0.6;     ///< between the two slides of an OCV
     double trades = 0.8;               ///< correlation of two strengths of which the recordings know the sum alone
     double in_one_place = 0.5;       ///< share of what a cause gains from the readings above which it has one place, a
                                      ///< twelfth of a recording, if the rest gains less than `detected`. Most of it:

@@ -26,6 +26,24 @@ TEST(Credibility, ASkewWithinTheJitterOfAnEdgeIsNone) {
   }
 }
 
+TEST(Credibility, StagesOfTheOcvComeCloserTogetherWithTheCapacityAlone) {
+  constexpr std::size_t shape = model::mechanism_index_of<model::OcvShape>,
+                        capacity = model::mechanism_index_of<model::CapacityChange>;
+  const double apart = thresholds.decision.slides_apart_soc, closer = thresholds.decision.stages_closer;
+  const auto slid = [&](double low, double high) {
+    HypothesisFit f = with_first(shape, low);
+    f.hypothesis.settings.front().value[1] = high;
+    return f;
+  };
+  HypothesisFit f = slid(0.03, 0.03 - 1.1 * closer * apart);
+  EXPECT_TRUE(is_implausible(f, shape));
+  EXPECT_FALSE(is_implausible(slid(0.03, 0.03 - 0.9 * closer * apart), shape));
+  EXPECT_FALSE(is_implausible(slid(-0.08, 0.08), shape)) << "a lost electrode spreads them";
+  EXPECT_FALSE(is_implausible(slid(0.1, 0.1), shape)) << "lost lithium moves both";
+  f.hypothesis.settings.push_back({capacity, {0.5 * closer}, {}});
+  EXPECT_FALSE(is_implausible(f, shape)) << "the capacity is lost as well";
+}
+
 PreparedRecording of_1200_s() {
   PreparedRecording r;
   std::vector<double>& time_s = r.time_s.edit();

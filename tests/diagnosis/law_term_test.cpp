@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/diagnose.hpp"
+#include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
@@ -142,6 +143,54 @@ TEST(LawTerm, AReadingThatStandsStillUntilTheVoltageHasMovedIsKnownByItsLeaps) {
   EXPECT_TRUE(follows_in_leaps(sticking));
   EXPECT_FALSE(follows_in_leaps(healthy));
   EXPECT_FALSE(follows_in_leaps(coarse));
+}
+
+TEST(LawTerm, AReadingInLeapsIsUnknownWhateverFitsIt) {
+  PreparedRecording r = test::recorded(test::drive(2, 31), 0.75, 31);
+  for (std::size_t k = 1; k < r.size(); ++k) {
+    const double fine_v = 0.001 * std::round(r.voltage_v[k] / 0.001), before_v = r.voltage_v[k - 1];
+    r.voltage_v.edit()[k] = std::abs(fine_v - before_v) > 0.003 ? fine_v : before_v;
+  }
+  const Diagnosis d = diagnose(test::table9(), {}, {r}, Options{});
+  EXPECT_EQ(d.verdict, Verdict::unknown) << d.statement;
+  EXPECT_FALSE(d.findings.empty()) << "the test is of no use: nothing fits it";
+  EXPECT_EQ(d.law ? d.law->law : "", "voltage");
+}
+
+TEST(LawTerm, AReadingThatMovesInEveryRowWithASquareWaveDoesNotLeap) {
+  // read once in each half of the wave
+  PreparedRecording r;
+  plant::Random random(5);
+  for (int k = 0; k < 400; ++k) {
+    r.time_s.edit().push_back(10.0 * k);
+    r.current_a.edit().push_back(k % 2 == 0 ? 0 : -4);
+    r.voltage_v.edit().push_back(3.9 - 0.0005 * k - (k % 2 == 0 ? 0 : 0.3) + 0.0001 * random.normal());
+  }
+  EXPECT_FALSE(follows_in_leaps(r));
+}
+
+TEST(LawTerm, AFaintLawIsUnknownUnlessItShowsInOnePlaceAlone) {
+  const auto law = [](const char* id, double gain, bool in_one_place) {
+    return a_law_has_changed({{"", "time", 90, 0, false}, {id, "soc", gain, 0, in_one_place}});
+  };
+  const double enough = law_thresholds.law.alone;
+  EXPECT_TRUE(law("ocv", 1.1 * enough, false));
+  EXPECT_FALSE(law("ocv", 1.1 * enough, true));
+  EXPECT_FALSE(law("ocv", 0.9 * enough, false));
+  EXPECT_FALSE(a_law_has_changed({{"", "time", 90, 0, false}})) << "no law by itself";
+}
+
+TEST(LawTerm, KnowsWhetherALawShowsInOnePlaceAlone) {
+  const auto likeliest = [](const AddV& add_v) {
+    const LikelihoodModel likelihood =
+        likelihood_model_of(test::table9(), {}, {test::recorded(test::drive(2, 31), 0.75, 31, add_v)});
+    const std::vector<LawEvidence> laws = law_evidence(likelihood, likelihood.noise());
+    return *likeliest_law(laws);
+  };
+  EXPECT_FALSE(likeliest(lift(0.02)).in_one_place);
+  EXPECT_TRUE(likeliest([](std::size_t row, double current_a, double) {
+                return row > 5'000 && row < 5'400 ? 0.002 * current_a : 0;
+              }).in_one_place);
 }
 
 TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }

@@ -1,6 +1,8 @@
 // What shows in one place of a recording only is not blamed on a part without healthy recordings of the cell.
 #include "diagnosis/one_place.hpp"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 
 #include "diagnosis/diagnose.hpp"
@@ -30,6 +32,16 @@ TEST(OnePlace, AKneeAtTheEndOfADischargeIsNotNamed) {
   EXPECT_GE(d.withheld.front().only_place->end_s, 2'600);
   EXPECT_TRUE(d.withheld.front().healthy.hours_needed);
   EXPECT_THAT(statement(d, {}), HasSubstr("no healthy recording of this cell says"));
+}
+
+TEST(OnePlace, WhatElseIsThereIsUnknown) {
+  const auto knee_and_hum = [](std::size_t k, double, double) {
+    return (k > 2'600 && k < 2'700 ? -0.03 : 0.0) + 0.002 * std::sin(2 * 3.14159265 * static_cast<double>(k) / 300);
+  };
+  const Diagnosis d = diagnose(test::table9(), {}, {test::recorded(discharge(), 0.9, 21, knee_and_hum)});
+  EXPECT_EQ(d.withheld.size(), 1U) << "what the knee looks like";
+  EXPECT_EQ(d.verdict, Verdict::unknown) << d.statement;
+  EXPECT_EQ(d.law ? d.law->law : "", "voltage");
 }
 
 TEST(OnePlace, TheSameSizeEverywhereIsNamed) {
