@@ -20,6 +20,7 @@ struct RealSet {
   bool held_out = false;  ///< the rules were not developed on this cell
   bool ocv_from_rests = false, ocv_from_load = false;
   std::optional<double> initial_soc;
+  bool test_start_estimated = false;  ///< soc_ref of `test` counts charge, from a start that is not known
   std::vector<std::string> calibration, healthy, ocv;
 };
 

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 
+#include "model/cell_parameters.hpp"
+
 namespace bms::identification {
 
 namespace {
@@ -12,8 +14,20 @@ namespace {
 constexpr std::array<double, 7> heights = {-0.9, -0.6, -0.3, 0, 0.3, 0.6, 0.9};  // of a corner, in allowed errors
 constexpr std::size_t levels = heights.size();
 constexpr double flattest = 1e-4;     // V per unit of SOC
+constexpr double steepest = (1 - 1e-6) * model::accepted::slope_v.high;  // of a cell file
 constexpr std::size_t narrowest = 2;  // grid steps; a cell file requires one at least
 constexpr double error_soc = 0.002;   // allowed horizontal error of a steep part
+
+/// The curve where it is steeper than a cell file accepts, next to empty or full, as steep as that: it is followed from
+/// the middle on.
+OcvCurve as_steep_as_accepted(OcvCurve curve) {
+  std::vector<double>& v = curve.ocv_v;
+  const auto most_v = [&](std::size_t k) { return steepest * (curve.soc[k + 1] - curve.soc[k]); };
+  const std::size_t middle = v.size() / 2;
+  for (std::size_t k = middle; k-- > 0;) v[k] = std::max(v[k], v[k + 1] - most_v(k));
+  for (std::size_t k = middle; k + 1 < v.size(); ++k) v[k + 1] = std::min(v[k + 1], v[k] + most_v(k));
+  return curve;
+}
 
 /// Allowed error [V] at each grid point.
 std::vector<double> allowed_errors(const OcvCurve& curve, double error_v) {
@@ -109,7 +123,7 @@ class FewestPieces {
   /// Tries all pieces that begin at a corner.
   void extend(std::size_t from, std::size_t level) {
     if (best_[from * levels + level].pieces == unreached) return;
-    double lowest = flattest, highest = std::numeric_limits<double>::infinity();
+    double lowest = flattest, highest = steepest;
     for (std::size_t to = from + 1; to < points_ && lowest <= highest; ++to) {
       const double width = curve_.soc[to] - curve_.soc[from];
       lowest = std::max(lowest, (curve_.ocv_v[to] - allowed_v_[to] - height(from, level)) / width);
@@ -140,7 +154,8 @@ class FewestPieces {
 
 }  // namespace
 
-std::optional<OcvPieces> fewest_pieces(const OcvCurve& curve, double error_v) {
+std::optional<OcvPieces> fewest_pieces(const OcvCurve& taken, double error_v) {
+  const OcvCurve curve = as_steep_as_accepted(taken);
   const FewestPieces search(curve, error_v);
   std::optional<OcvPieces> pieces = search.corners();
   if (!pieces) return std::nullopt;
