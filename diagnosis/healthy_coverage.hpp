@@ -18,8 +18,8 @@ struct BeyondHealthy {
 };
 
 struct HealthyCoverage {
-  double share = 0;                   ///< that healthy blocks stand for: of the rows or, if less, of the squared current
-  double least = 0;                   ///< the same of the recording that has the least
+  double share = 0;  ///< that healthy blocks stand for: of the rows or, if less, of the squared current
+  double least = 0;  ///< the same of the recording that has the least
   std::vector<BeyondHealthy> beyond;  ///< the axis with most rows first; without those that no row leaves
 };
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<double, 7> heights = {-0.9, -0.6, -0.3, 0, 0.3, 0.6, 0.9};  // of a corner, in allowed errors
 constexpr std::size_t levels = heights.size();
-constexpr double flattest = 1e-4;     // V per unit of SOC
+constexpr double flattest = 1e-4;                                        // V per unit of SOC
 constexpr double steepest = (1 - 1e-6) * model::accepted::slope_v.high;  // of a cell file
 constexpr std::size_t narrowest = 2;  // grid steps; a cell file requires one at least
 constexpr double error_soc = 0.002;   // allowed horizontal error of a steep part

@@ -93,8 +93,8 @@ std::vector<diagnosis::Hypothesis> one_sigma_away(const diagnosis::Diagnosis& d,
       model::MechanismSetting& setting = h.settings[s.setting];
       const model::Parameter& p = catalogue[setting.index].parameter[s.parameter];
       double& value = setting.value[s.parameter];
-      value = std::clamp(value + sigma * axes.vectors(static_cast<Eigen::Index>(k), axis),
-                         p.lower(d.cell.capacity_ah), p.upper(d.cell.capacity_ah));
+      value = std::clamp(value + sigma * axes.vectors(static_cast<Eigen::Index>(k), axis), p.lower(d.cell.capacity_ah),
+                         p.upper(d.cell.capacity_ah));
     }
   }
   return list;

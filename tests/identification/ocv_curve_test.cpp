@@ -121,7 +121,8 @@ TEST(OcvPieces, FollowASteepCurve) {
   ASSERT_TRUE(pieces);
   for (std::size_t k = 1; k < pieces->soc.size(); ++k) {
     EXPECT_GE(pieces->soc[k] - pieces->soc[k - 1], 0.002 - 1e-12) << "a cell file accepts no narrower pieces";
-    EXPECT_LT((pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]), 60) << "nor steeper ones";
+    EXPECT_LT((pieces->ocv_v[k] - pieces->ocv_v[k - 1]) / (pieces->soc[k] - pieces->soc[k - 1]), 60)
+        << "nor steeper ones";
   }
   EXPECT_LE(pieces->largest_error_v, 0.002);
 }
