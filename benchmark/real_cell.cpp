@@ -70,7 +70,7 @@ std::vector<RealSet> read_sets(files::TomlTable& list) {
     if (t.has("calibration_from_s")) s.calibration_from_s = t.number("calibration_from_s");
     if (t.has("cells_in_parallel")) s.cells_in_parallel = t.number("cells_in_parallel");
     if (t.has("test")) s.test = t.text("test");
-    if (t.has("test_start_estimated")) s.test_start_estimated = t.flag("test_start_estimated");
+    if (t.has("test_initial_soc")) s.test_initial_soc = t.number("test_initial_soc");
     t.finish();
     sets.push_back(std::move(s));
   }
@@ -118,7 +118,7 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   p.cell = *workflow::identify_cell(options).cell_file;
   if (set.cells_in_parallel > 1) workflow::scale_to(set.cells_in_parallel * p.cell.parameters.capacity_ah, p.cell);
   p.test = workflow::read_for_diagnosis(test, {}, p.cell);
-  if (set.test_start_estimated) p.test.soc_ref = {};
+  if (set.test_initial_soc && !p.test.soc_ref.empty()) p.test.soc_ref.edit().front() = *set.test_initial_soc;
   for (const std::string& name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
   return p;
 }

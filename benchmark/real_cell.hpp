@@ -19,8 +19,7 @@ struct RealSet {
   double capacity_ah = 0, cells_in_parallel = 1;
   bool held_out = false;  ///< the rules were not developed on this cell
   bool ocv_from_rests = false, ocv_from_load = false;
-  std::optional<double> initial_soc;
-  bool test_start_estimated = false;  ///< soc_ref of `test` counts charge, from a start that is not known
+  std::optional<double> initial_soc, test_initial_soc;  ///< of `calibration`, of `test`; nothing: soc_ref
   std::vector<std::string> calibration, healthy, ocv;
 };
 

@@ -169,34 +169,24 @@ std::vector<DetectionLimit> stated_limits(const LikelihoodModel& likelihood, con
   return limits_of(sigmas, adequacy.residual, capacity_ah, stands_out, gain_of_size);
 }
 
-/// What is left of the judgement if nothing may be named: whether something else is there, in more than one place.
-Adequacy without_causes(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& control) {
-  Survivors nothing{control, {}, {}, {}};
-  Adequacy adequacy = judge(likelihood, nominal, control, nothing);
+/// Without healthy recordings nothing is named that shows in one place alone. Something unknown elsewhere stays.
+void withhold_only_place(LikelihoodModel& likelihood, const NoiseModel& nominal, const HypothesisFit& control,
+                         double false_alarm_rate, Survivors& survivors, Adequacy& adequacy,
+                         std::vector<Withheld>& withheld) {
+  if (!adequacy.only_place) return;
+  withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains, false_alarm_rate);
+  survivors = {control, {}, {}, {}};
+  adequacy = judge(likelihood, nominal, control, survivors);
   if (adequacy.residual.only_place) adequacy.unknown = false;
-  return adequacy;
-}
-
-/// Without healthy recordings: something unknown is there if the voltage is read in leaps, which no cause makes, or if
-/// nothing was found but a law has changed. laws: filled in if they were asked for.
-void find_unknown(const LikelihoodModel& likelihood, const NoiseModel& nominal, Adequacy& adequacy,
-                  std::vector<LawEvidence>& laws) {
-  const std::vector<PreparedRecording>& records = likelihood.records();
-  if (std::any_of(records.begin(), records.end(), follows_in_leaps)) adequacy.unknown = true;
-  if (adequacy.found || adequacy.unknown) return;
-  laws = law_evidence(likelihood, nominal);
-  adequacy.unknown = a_law_has_changed(laws);
 }
 
 /// Where an unknown cause sits, and the cell with a term for it. One or two causes that are named although a law that
 /// no mechanism changes explains more are unknown. A file that lacks three is plain: whatever it lacks looks foreign as
 /// well. With healthy recordings the catalogue is judged by them.
-/// laws: by the cell file as it is, if known already.
-void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy,
-                  std::vector<LawEvidence> laws, Diagnosis& d) {
+void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
   const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.law.doubted;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
-  if (laws.empty()) laws = law_evidence(likelihood, nominal);
+  std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {
     double foreign = 0;
     for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
@@ -240,15 +230,10 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
-  std::vector<LawEvidence> laws;
   if (!judge_healthy && !options.learns) {
-    if (adequacy.only_place) {
-      d.withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains,
-                               options.false_alarm_rate);
-      survivors = {control, {}, {}, {}};
-      adequacy = without_causes(likelihood, search.nominal_noise(), control);
-    }
-    find_unknown(likelihood, search.nominal_noise(), adequacy, laws);
+    withhold_only_place(likelihood, search.nominal_noise(), control, options.false_alarm_rate, survivors, adequacy,
+                        d.withheld);
+    if (is_read_in_leaps(likelihood.records())) adequacy.unknown = true;  // which no cause makes
   }
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   d.unknown_gain = unknown_gain(adequacy.residual);
@@ -273,7 +258,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   // that nothing was found yet does not mean that nothing is there
   if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
   add_numbers(adequacy, search.nominal_noise(), d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, std::move(laws), d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);

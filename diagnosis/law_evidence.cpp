@@ -9,7 +9,6 @@
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/generic_columns.hpp"
 #include "diagnosis/law_thresholds.hpp"
-#include "diagnosis/one_place.hpp"
 #include "diagnosis/residual_projection.hpp"
 #include "diagnosis/symmetric_eigen.hpp"
 #include "diagnosis/thresholds.hpp"
@@ -158,66 +157,29 @@ Columns law_columns(const LikelihoodModel& likelihood, const HypothesisFit& fit)
   return columns;
 }
 
-/// Of a form of a law.
-struct FormEvidence {
-  double gain = 0;
-  Eigen::VectorXd strengths;  ///< of its columns, the most probable
-};
-
 /// With the width of the prior that has the most evidence.
-FormEvidence evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
+double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
   const SymmetricEigen eigen = symmetric_eigen(gram);
-  const Eigen::VectorXd power = eigen.values.cwiseMax(0.0), along = eigen.vectors.transpose() * toward;
-  FormEvidence best{0, Eigen::VectorXd::Zero(toward.size())};
+  const Eigen::VectorXd power = eigen.values.cwiseMax(0.0),
+                        along = (eigen.vectors.transpose() * toward).array().square();
+  double best = 0;
   for (double width = evidence_limits.narrowest; width <= evidence_limits.widest; width *= 2) {
     const double s2 = width * width;
     const Eigen::ArrayXd grown = 1 + s2 * power.array();
-    const double gain = (s2 * along.array().square() / grown).sum() - grown.log().sum();
-    if (gain > best.gain) best = {gain, eigen.vectors * (s2 * along.array() / grown).matrix()};
+    best = std::max(best, (s2 * along.array() / grown).sum() - grown.log().sum());
   }
   return best;
 }
 
-/// The evidence of forms, collected by law.
-class Laws {
- public:
-  explicit Laws(const LikelihoodModel& likelihood) : likelihood_(likelihood) {}
-
-  void add(const LawForm& form, const ResidualProjection::Products& products) {
-    const FormEvidence e =
-        evidence_of(products.gram(form.first, form.count), products.toward().segment(form.first, form.count));
-    if (!add(form.law, form.depends_on, e.gain, form.foreign)) return;
-    of(form.law).in_one_place =
-        only_place(likelihood_, products.residual_with(form.first, Eigen::VectorXd::Zero(form.count)),
-                   products.residual_with(form.first, e.strengths), 0)
-            .has_value();
-  }
-  /// Returns true if it is the best form of its law so far.
-  bool add(const char* law, const char* depends_on, double gain, bool foreign) {
-    LawEvidence& same = of(law);
-    if (foreign) same.foreign = std::max(same.foreign, gain);
-    if (gain <= same.gain) return false;
-    same.depends_on = depends_on;
-    same.gain = gain;
-    same.in_one_place = false;
-    return true;
-  }
-  std::vector<LawEvidence> sorted() && {
-    std::sort(found_.begin(), found_.end(), [](const LawEvidence& a, const LawEvidence& b) { return a.gain > b.gain; });
-    return std::move(found_);
-  }
-
- private:
-  LawEvidence& of(const char* law) {
-    auto same = std::find_if(found_.begin(), found_.end(),
-                             [&](const LawEvidence& e) { return std::string_view(e.law) == law; });
-    if (same == found_.end()) same = found_.insert(found_.end(), {law, ""});
-    return *same;
-  }
-
-  const LikelihoodModel& likelihood_;
-  std::vector<LawEvidence> found_;
-};
+void add_evidence(std::vector<LawEvidence>& found, const char* law, const char* depends_on, double gain, bool foreign) {
+  auto same =
+      std::find_if(found.begin(), found.end(), [&](const LawEvidence& e) { return std::string_view(e.law) == law; });
+  if (same == found.end()) same = found.insert(found.end(), {law, depends_on, 0, 0});
+  if (foreign) same->foreign = std::max(same->foreign, gain);
+  if (gain <= same->gain) return;
+  same->depends_on = depends_on;
+  same->gain = gain;
+}
 
 /// Of the frequency that explains most, less what the best of so many explains by chance.
 double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProjection& projection) {
@@ -232,7 +194,7 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
     const ResidualProjection::Products products = projection.of(white);
     for (std::size_t f = 0; f < count; ++f) {
       const Eigen::Index at = 2 * static_cast<Eigen::Index>(f);
-      best[k] = std::max(best[k], evidence_of(products.gram(at, 2), products.toward().segment(at, 2)).gain);
+      best[k] = std::max(best[k], evidence_of(products.gram(at, 2), products.toward().segment(at, 2)));
     }
   });
   double most = 0;
@@ -245,11 +207,6 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
 const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws) {
   const auto most = std::find_if(laws.begin(), laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
   return most == laws.end() || most->gain < evidence_limits.least ? nullptr : &*most;
-}
-
-bool a_law_has_changed(const std::vector<LawEvidence>& laws) {
-  const LawEvidence* most = likeliest_law(laws);
-  return most != nullptr && most->gain >= evidence_limits.alone && !most->in_one_place;
 }
 
 bool follows_in_leaps(const PreparedRecording& r) {
@@ -276,24 +233,33 @@ bool follows_in_leaps(const PreparedRecording& r) {
          least_v > leap_limits.of_median * measurement::upper_median(moves);
 }
 
+bool is_read_in_leaps(const std::vector<PreparedRecording>& records) {
+  return std::any_of(records.begin(), records.end(), follows_in_leaps);
+}
+
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const ResidualProjection projection(likelihood, fit);
-  Laws laws(likelihood);
+  std::vector<LawEvidence> found;
   GenericColumns generic = generic_columns(likelihood, fit);
   likelihood.whiten(generic.columns);
   const ResidualProjection::Products of_generic = projection.of(generic.columns);
   for (const ColumnFamily& f : generic.families) {
     const auto form = std::find_if(family_forms.begin(), family_forms.end(),
                                    [&](const FamilyForm& x) { return x.family == f.depends_on; });
-    if (form != family_forms.end())
-      laws.add({form->law, form->depends_on, f.first, f.count, form->foreign}, of_generic);
+    if (form == family_forms.end()) continue;
+    add_evidence(found, form->law, form->depends_on,
+                 evidence_of(of_generic.gram(f.first, f.count), of_generic.toward().segment(f.first, f.count)),
+                 form->foreign);
   }
   Columns more = law_columns(likelihood, fit);
   likelihood.whiten(more);
   const ResidualProjection::Products of_more = projection.of(more);
-  for (const LawForm& f : extra_forms) laws.add(f, of_more);
-  laws.add("voltage", "time", evidence_of_a_wave(likelihood, projection), true);
-  return std::move(laws).sorted();
+  for (const LawForm& f : extra_forms)
+    add_evidence(found, f.law, f.depends_on,
+                 evidence_of(of_more.gram(f.first, f.count), of_more.toward().segment(f.first, f.count)), f.foreign);
+  add_evidence(found, "voltage", "time", evidence_of_a_wave(likelihood, projection), true);
+  std::sort(found.begin(), found.end(), [](const LawEvidence& a, const LawEvidence& b) { return a.gain > b.gain; });
+  return found;
 }
 
 }  // namespace bms::diagnosis

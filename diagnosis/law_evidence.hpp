@@ -16,11 +16,10 @@
 namespace bms::diagnosis {
 
 struct LawEvidence {
-  const char* law;            ///< as LawTerm::law; "": a function of the time, which every law is
-  const char* depends_on;     ///< soc, current, time, temperature, voltage
-  double gain = 0;            ///< the evidence
-  double foreign = 0;         ///< gain of the best form that no mechanism of the catalogue has
-  bool in_one_place = false;  ///< all that speaks for it lies in one place of the recordings (one_place.hpp)
+  const char* law;         ///< as LawTerm::law; "": a function of the time, which every law is
+  const char* depends_on;  ///< soc, current, time, temperature, voltage
+  double gain = 0;         ///< the evidence
+  double foreign = 0;      ///< gain of the best form that no mechanism of the catalogue has
 };
 
 /// The largest first; the best form of each law.
@@ -29,11 +28,10 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const H
 /// The law with the most evidence; nullptr if none has enough to be named.
 const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws);
 
-/// Returns true if a law has so much evidence, in more than one place, that something unknown has changed it.
-bool a_law_has_changed(const std::vector<LawEvidence>& laws);
-
 /// Returns true if the voltage's reading often stands still, and never moves by less than several of the steps that it
 /// can resolve: it stands until the voltage has left it by a threshold.
 bool follows_in_leaps(const PreparedRecording& r);
+/// The same of any of several recordings.
+bool is_read_in_leaps(const std::vector<PreparedRecording>& records);
 
 }  // namespace bms::diagnosis

@@ -217,7 +217,7 @@ std::optional<LawTerm> learn_law_term(const LikelihoodModel& likelihood, const N
   LawTerm term;
   term.laws = std::move(laws);
   const std::vector<PreparedRecording>& records = likelihood.records();
-  if (std::any_of(records.begin(), records.end(), follows_in_leaps)) {
+  if (is_read_in_leaps(records)) {
     term.law = "voltage";
     term.depends_on = {"voltage"};
     return term;

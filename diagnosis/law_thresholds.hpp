@@ -21,7 +21,6 @@ struct TermThresholds {
 /// The evidence of a law (law_evidence.hpp).
 struct EvidenceThresholds {
   double least = 20;        ///< of a law: healthy recordings have less
-  double alone = 30;        ///< of a law, from which something unknown is there although nothing else shows it
   std::size_t doubted = 2;  ///< so many causes, named without healthy recordings, are doubted: a file that lacks more
                             ///< is plain, and whatever it lacks looks foreign as well
   double narrowest = 1.0 / 64, widest = 4;  ///< prior of a law's columns, times the free error

@@ -169,30 +169,6 @@ TEST(LawTerm, AReadingThatMovesInEveryRowWithASquareWaveDoesNotLeap) {
   EXPECT_FALSE(follows_in_leaps(r));
 }
 
-TEST(LawTerm, AFaintLawIsUnknownUnlessItShowsInOnePlaceAlone) {
-  const auto law = [](const char* id, double gain, bool in_one_place) {
-    return a_law_has_changed({{"", "time", 90, 0, false}, {id, "soc", gain, 0, in_one_place}});
-  };
-  const double enough = law_thresholds.law.alone;
-  EXPECT_TRUE(law("ocv", 1.1 * enough, false));
-  EXPECT_FALSE(law("ocv", 1.1 * enough, true));
-  EXPECT_FALSE(law("ocv", 0.9 * enough, false));
-  EXPECT_FALSE(a_law_has_changed({{"", "time", 90, 0, false}})) << "no law by itself";
-}
-
-TEST(LawTerm, KnowsWhetherALawShowsInOnePlaceAlone) {
-  const auto likeliest = [](const AddV& add_v) {
-    const LikelihoodModel likelihood =
-        likelihood_model_of(test::table9(), {}, {test::recorded(test::drive(2, 31), 0.75, 31, add_v)});
-    const std::vector<LawEvidence> laws = law_evidence(likelihood, likelihood.noise());
-    return *likeliest_law(laws);
-  };
-  EXPECT_FALSE(likeliest(lift(0.02)).in_one_place);
-  EXPECT_TRUE(likeliest([](std::size_t row, double current_a, double) {
-                return row > 5'000 && row < 5'400 ? 0.002 * current_a : 0;
-              }).in_one_place);
-}
-
 TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }
 
 }  // namespace
