@@ -174,7 +174,8 @@ void withhold_only_place(LikelihoodModel& likelihood, const NoiseModel& nominal,
                          double false_alarm_rate, Survivors& survivors, Adequacy& adequacy,
                          std::vector<Withheld>& withheld) {
   if (!adequacy.only_place) return;
-  withheld = withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains, false_alarm_rate);
+  withheld =
+      withheld_at(likelihood, *adequacy.only_place, survivors.best.hypothesis, survivors.gains, false_alarm_rate);
   survivors = {control, {}, {}, {}};
   adequacy = judge(likelihood, nominal, control, survivors);
   if (adequacy.residual.only_place) adequacy.unknown = false;
