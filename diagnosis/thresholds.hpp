@@ -345,18 +345,17 @@ struct Thresholds {
     double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
     double temperature_beyond_k = 5;  ///< [K]
     double current_beyond = 1.25;     ///< times their largest current
-    double covered_at_least =
-        0.5;                   ///< share of a recording's rows and squared current that the healthy blocks stand for
-    double error_times = 1.5;  ///< of the RMS error of healthy recordings: a few know it to a third
-    double error_at_least_v = 5e-4;  ///< [V]
-    double learned_within = 0.95;    ///< share of a recording's rows where healthy ones were, from which their error
-                                     ///< takes the place of the cell file's tolerance
-    double tolerance_counts = 1;     ///< in the band of a prediction the cell file's tolerance counts as so many more
-                                     ///< healthy recordings
-    double tolerance_beyond = 1.5;   ///< factor on the tolerance in that band where no healthy recording was. With
-                                     ///< both, 92 % of the readings of eleven recordings of B0025 and A123 A002 that
-                                     ///< were left out lie within the band, 91 % with a factor of 1
-    double gross_times = 2;          ///< RMS error over the largest of a healthy block, above which it is gross
+    double covered_at_least = 0.5;    ///< share of a recording's rows and squared current where healthy ones were
+    double error_times = 1.5;         ///< of the RMS error of healthy recordings: a few know it to a third
+    double error_at_least_v = 5e-4;   ///< [V]
+    double learned_within = 0.95;     ///< share of a recording's rows where healthy ones were, from which their error
+                                      ///< takes the place of the cell file's tolerance
+    double tolerance_counts = 1;      ///< in the band of a prediction the cell file's tolerance counts as so many more
+                                      ///< healthy recordings
+    double tolerance_beyond = 1.5;    ///< factor on the tolerance in that band where no healthy recording was. With
+                                      ///< both, 92 % of the readings of eleven recordings of B0025 and A123 A002 that
+                                      ///< were left out lie within the band, 91 % with a factor of 1
+    double gross_times = 2;           ///< RMS error over the largest of a healthy block, above which it is gross
   };
 
   /// Tolerances of an extended cell file are widened by one of these factors (model_tolerance.hpp).
