@@ -93,41 +93,90 @@ void LikelihoodModel::set_noise(const NoiseModel& noise) {
   latest_.set(nullptr);
 }
 
-double LikelihoodModel::cost_of_noise(const Columns& raw, const NoiseModel& noise, const NoiseModel& nominal) const {
-  double sum = price_of_noise(noise, nominal);
+std::vector<double> LikelihoodModel::costs_of_noise(const Columns& raw, std::span<const NoiseModel> noises,
+                                                    const NoiseModel& nominal) const {
+  std::vector<double> sums;
+  for (const NoiseModel& noise : noises) sums.push_back(price_of_noise(noise, nominal));
   std::size_t row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    sum += minus_two_log_likelihood(noise, records_[r].time_s, row_noise_[r], usable_[r],
-                                    {raw.data() + row, records_[r].size()});
+    const std::vector<double> of_record = minus_two_log_likelihoods(
+        noises, records_[r].time_s, row_noise_[r], usable_[r], {raw.data() + row, records_[r].size()});
+    for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += of_record[k];
     row += records_[r].size();
   }
-  if (checks_ == 0) return sum;
-  Columns checks = raw.bottomRows(static_cast<Eigen::Index>(checks_));
-  sum += whiten_checks(checks, 0, noise);
-  return sum + checks.squaredNorm();
+  if (checks_ == 0) return sums;
+  for (std::size_t k = 0; k < sums.size(); ++k) {
+    Columns checks = raw.bottomRows(static_cast<Eigen::Index>(checks_));
+    sums[k] += whiten_checks(checks, 0, noises[k]);
+    sums[k] += checks.squaredNorm();
+  }
+  return sums;
 }
+
+namespace {
+
+/// Steps of a coordinate search over a noise model's amplitudes: each up and down by a factor, not below the nominal
+/// one.
+class NoiseSteps {
+ public:
+  NoiseSteps(const NoiseModel& nominal, bool with_checks) : nominal_(nominal), tried_{nominal} {
+    for (const auto member : amplitudes) {
+      const bool of_checks = member == &NoiseModel::current_check || member == &NoiseModel::voltage_check;
+      if (!of_checks || with_checks) members_.push_back(member);
+    }
+  }
+  std::size_t count() const { return 2 * members_.size(); }
+
+  struct Step {
+    std::size_t at;
+    NoiseModel noise;
+  };
+  /// Those from step `first` on that are not tried yet.
+  std::vector<Step> untried(const NoiseModel& from, double factor, std::size_t first) const {
+    std::vector<Step> steps;
+    for (std::size_t at = first; at < count(); ++at) {
+      const auto member = members_[at / 2];
+      NoiseModel n = from;
+      n.*member = std::max(from.*member * (at % 2 == 0 ? factor : 1 / factor), nominal_.*member);
+      const auto same = [&](const NoiseModel& t) { return is_same(t, n); };
+      if (std::none_of(tried_.begin(), tried_.end(), same) &&
+          std::none_of(steps.begin(), steps.end(), [&](const Step& s) { return same(s.noise); }))
+        steps.push_back({at, n});
+    }
+    return steps;
+  }
+  void mark_tried(const NoiseModel& noise) { tried_.push_back(noise); }
+
+ private:
+  const NoiseModel& nominal_;
+  std::vector<double NoiseModel::*> members_;
+  std::vector<NoiseModel> tried_;  // the cost falls from best to best: what was tried is never better
+};
+
+}  // namespace
 
 NoiseModel LikelihoodModel::likeliest_noise(const Columns& raw, const NoiseModel& nominal, double& cost) const {
   NoiseModel best = nominal;
-  cost = cost_of_noise(raw, best, nominal);
-  std::vector<NoiseModel> tried = {best};  // the cost falls from best to best: what was tried is never better
-  // coordinate search over the amplitudes, in ever smaller factors
+  cost = costs_of_noise(raw, {&best, 1}, nominal).front();
+  NoiseSteps search(nominal, checks_ > 0);
   for (const double factor : numerics.noise.amplitude_factors) {
     for (bool moved = true; moved;) {
       moved = false;
-      for (const auto member : amplitudes) {
-        const bool of_checks = member == &NoiseModel::current_check || member == &NoiseModel::voltage_check;
-        if (of_checks && checks_ == 0) continue;
-        for (const double by : {factor, 1 / factor}) {
-          NoiseModel n = best;
-          n.*member = std::max(best.*member * by, nominal.*member);
-          if (std::any_of(tried.begin(), tried.end(), [&](const NoiseModel& t) { return is_same(t, n); })) continue;
-          tried.push_back(n);
-          const double c = cost_of_noise(raw, n, nominal);
-          if (c >= cost) continue;
-          cost = c;
-          best = n;
+      for (std::size_t first = 0; first < search.count();) {
+        // all that are left at once; after a better one the rest is computed again from there
+        const std::vector<NoiseSteps::Step> steps = search.untried(best, factor, first);
+        std::vector<NoiseModel> noises;
+        for (const NoiseSteps::Step& s : steps) noises.push_back(s.noise);
+        const std::vector<double> costs = costs_of_noise(raw, noises, nominal);
+        first = search.count();
+        for (std::size_t k = 0; k < steps.size(); ++k) {
+          search.mark_tried(steps[k].noise);
+          if (costs[k] >= cost) continue;
+          cost = costs[k];
+          best = steps[k].noise;
           moved = true;
+          first = steps[k].at + 1;
+          break;
         }
       }
     }

@@ -147,7 +147,8 @@ class LikelihoodModel {
   std::shared_ptr<const Linearisation> factorised(Point at, Columns columns) const;
   std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
   /// -2 log posterior of a noise model by a raw residual, without the constant.
-  double cost_of_noise(const Columns& raw, const NoiseModel& noise, const NoiseModel& nominal) const;
+  std::vector<double> costs_of_noise(const Columns& raw, std::span<const NoiseModel> noises,
+                                     const NoiseModel& nominal) const;
   /// Returns the logarithm of the determinant of the checks' covariance.
   double whiten(Columns& columns, const std::vector<Whitener>& by, const NoiseModel& noise) const;
   /// Checks of one voltage channel share its drift: their covariance is I + w w', undone by (I + w w')^-1/2.

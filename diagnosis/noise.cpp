@@ -6,6 +6,7 @@
 #include "arithmetic/vector_width.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -21,116 +22,161 @@ double price_of_noise(const NoiseModel& n, const NoiseModel& nominal) {
 
 namespace {
 
+/// Noise models next to each other, a lane each.
+using Lanes = arithmetic::FourDoubles;
+using arithmetic::doubles_at_once;
+
+template <class Function>
+void each_lane(double& x, const Function& f) {
+  x = f(x);
+}
+template <class Function>
+void each_lane(Lanes& x, const Function& f) {
+  for (std::size_t lane = 0; lane < doubles_at_once; ++lane) x[lane] = f(x[lane]);
+}
+
+/// Squares of a noise model's amplitudes, or of several. Value: double or Lanes.
+template <class Value>
+struct Squares {
+  Value white_v2, fast_v2, slow_v2, edge2;
+};
+
+Squares<double> squares_of(const NoiseModel& n) {
+  return {n.white_v * n.white_v, n.fast_v * n.fast_v, n.slow_v * n.slow_v, n.edge * n.edge};
+}
+
 /// The Kalman filter of the fast and the slow part, as far as it does not depend on the residual: gains row by row.
+template <class Value>
 class NoiseFilter {
  public:
-  NoiseFilter(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows, std::span<const char> usable)
-      : n_(n),
-        time_s_(time_s),
-        rows_(rows),
-        usable_(usable),
-        white_v2_(n.white_v * n.white_v),
-        edge2_(n.edge * n.edge) {}
+  /// times: only the correlation times count.
+  NoiseFilter(const Squares<Value>& squares, const NoiseModel& times, std::span<const double> time_s,
+              const RowNoise& rows, std::span<const char> usable)
+      : of_(squares), times_(times), time_s_(time_s), rows_(rows), usable_(usable) {}
 
   struct Gain {
-    double fast, slow;              ///< Kalman gain of each state
+    Value fast, slow;               ///< Kalman gain of each state
     double fast_decay, slow_decay;  ///< of each state until the next row
-    double slow_size;               ///< standard deviation of the slow part over that on a flat OCV
-    double variance;                ///< of the innovation; 0: row not used
+    Value slow_size;                ///< standard deviation of the slow part over that on a flat OCV
+    Value variance;                 ///< of the innovation, if the row is used
+    bool used;
   };
   /// Of row k; the rows must be taken in turn.
   Gain next(std::size_t k) {
     const double to_next_s = k + 1 < time_s_.size() ? time_s_[k + 1] - time_s_[k] : 0;
     if (to_next_s != last_s_) {  // steps are mostly equal
       last_s_ = to_next_s;
-      fast_decay_ = std::exp(-to_next_s / n_.fast_s);
-      slow_decay_ = std::exp(-to_next_s / n_.slow_s);
+      fast_decay_ = std::exp(-to_next_s / times_.fast_s);
+      slow_decay_ = std::exp(-to_next_s / times_.slow_s);
     }
-    const double size = slow_v2_ > 0 ? std::sqrt(1 + rows_.slow_v2[k] / slow_v2_) : 1;
-    Gain g{0, 0, fast_decay_, slow_decay_, size, 0};
-    ff_ += edge2_ * rows_.edge_v2[k];
-    if (usable_[k] != 0) {
-      const double with_fast = ff_ + size * fs_, with_slow = fs_ + size * ss_;
-      g.variance = with_fast + size * with_slow + white_v2_ + edge2_ * rows_.white_v2[k];
-      const double information = 1 / g.variance;
+    Value size = 1 + (of_.slow_v2 > Value{} ? rows_.slow_v2[k] / of_.slow_v2 : Value{});
+    each_lane(size, [](double x) { return std::sqrt(x); });
+    Gain g{Value{}, Value{}, fast_decay_, slow_decay_, size, Value{}, usable_[k] != 0};
+    ff_ += of_.edge2 * rows_.edge_v2[k];
+    if (g.used) {
+      const Value with_fast = ff_ + size * fs_, with_slow = fs_ + size * ss_;
+      g.variance = with_fast + size * with_slow + of_.white_v2 + of_.edge2 * rows_.white_v2[k];
+      const Value information = 1 / g.variance;
       g.fast = with_fast * information;
       g.slow = with_slow * information;
       ff_ -= g.fast * with_fast;
       fs_ -= g.fast * with_slow;
       ss_ -= g.slow * with_slow;
     }
-    ff_ = fast_v2_ + fast_decay_ * fast_decay_ * (ff_ - fast_v2_);
-    ss_ = slow_v2_ + slow_decay_ * slow_decay_ * (ss_ - slow_v2_);
+    ff_ = of_.fast_v2 + fast_decay_ * fast_decay_ * (ff_ - of_.fast_v2);
+    ss_ = of_.slow_v2 + slow_decay_ * slow_decay_ * (ss_ - of_.slow_v2);
     fs_ *= fast_decay_ * slow_decay_;
     return g;
   }
 
  private:
-  const NoiseModel& n_;
+  Squares<Value> of_;
+  const NoiseModel& times_;
   std::span<const double> time_s_;
   const RowNoise& rows_;
   std::span<const char> usable_;
-  double white_v2_, edge2_;
-  double fast_v2_ = n_.fast_v * n_.fast_v, slow_v2_ = n_.slow_v * n_.slow_v;
-  double ff_ = fast_v2_, ss_ = slow_v2_, fs_ = 0;  ///< covariance of (fast, slow), stationary at first
+  Value ff_ = of_.fast_v2, ss_ = of_.slow_v2, fs_{};  ///< covariance of (fast, slow), stationary at first
   double last_s_ = -1, fast_decay_ = 1, slow_decay_ = 1;
 };
 
 /// Sum of logarithms: of products as long as a double holds them, because a logarithm costs as much as a row.
+template <class Value>
 class SumOfLogarithms {
  public:
-  void add(double x) {
+  void add(const Value& x) {
     product_ *= x;
     if (++factors_ == numerics.noise.factors) flush();
   }
-  double value() {
+  void add_to(Value& sum) {
     flush();
-    return sum_;
+    sum += sum_;
   }
 
  private:
   void flush() {
-    sum_ += std::log(product_);
-    product_ = 1;
+    each_lane(product_, [](double x) { return std::log(x); });
+    sum_ += product_;
+    product_ = one;
     factors_ = 0;
   }
-  double sum_ = 0, product_ = 1;
+  static constexpr Value one = Value{} + 1;
+  Value sum_{}, product_ = one;
   int factors_ = 0;
 };
+
+/// -2 log likelihoods of some noise models, a lane each.
+void add_costs(const Squares<Lanes>& squares, const NoiseModel& times, std::span<const double> time_s,
+               const RowNoise& rows, std::span<const char> usable, std::span<const double> residual_v, Lanes& sum) {
+  NoiseFilter<Lanes> filter(squares, times, time_s, rows, usable);
+  SumOfLogarithms<Lanes> log_determinant;
+  Lanes fast{}, slow{};
+  for (std::size_t k = 0; k < time_s.size(); ++k) {
+    const NoiseFilter<Lanes>::Gain g = filter.next(k);
+    const Lanes innovation = g.used ? residual_v[k] - fast - g.slow_size * slow : Lanes{};
+    fast = g.fast_decay * (fast + g.fast * innovation);
+    slow = g.slow_decay * (slow + g.slow * innovation);
+    if (!g.used) continue;
+    sum += innovation * innovation / g.variance;
+    log_determinant.add(g.variance);
+  }
+  log_determinant.add_to(sum);
+}
 
 }  // namespace
 
 Whitener::Whitener(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
                    std::span<const char> usable)
     : gains_(time_s.size()) {
-  NoiseFilter filter(n, time_s, rows, usable);
-  SumOfLogarithms log_determinant;
+  NoiseFilter<double> filter(squares_of(n), n, time_s, rows, usable);
+  SumOfLogarithms<double> log_determinant;
   for (std::size_t k = 0; k < gains_.size(); ++k) {
-    const NoiseFilter::Gain g = filter.next(k);
-    const bool used = g.variance > 0;
-    gains_[k] = {g.fast, g.slow, g.fast_decay, g.slow_decay, g.slow_size, used ? 1 / std::sqrt(g.variance) : 0};
-    if (!used) continue;
+    const NoiseFilter<double>::Gain g = filter.next(k);
+    gains_[k] = {g.fast, g.slow, g.fast_decay, g.slow_decay, g.slow_size, g.used ? 1 / std::sqrt(g.variance) : 0};
+    if (!g.used) continue;
     log_determinant.add(g.variance);
     ++used_;
   }
-  log_determinant_ = log_determinant.value();
+  log_determinant.add_to(log_determinant_);
 }
 
-double minus_two_log_likelihood(const NoiseModel& n, std::span<const double> time_s, const RowNoise& rows,
-                                std::span<const char> usable, std::span<const double> residual_v) {
-  NoiseFilter filter(n, time_s, rows, usable);
-  SumOfLogarithms log_determinant;
-  double fast = 0, slow = 0, squares = 0;
-  for (std::size_t k = 0; k < time_s.size(); ++k) {
-    const NoiseFilter::Gain g = filter.next(k);
-    const double innovation = g.variance > 0 ? residual_v[k] - fast - g.slow_size * slow : 0;
-    fast = g.fast_decay * (fast + g.fast * innovation);
-    slow = g.slow_decay * (slow + g.slow * innovation);
-    if (!(g.variance > 0)) continue;
-    squares += innovation * innovation / g.variance;
-    log_determinant.add(g.variance);
+std::vector<double> minus_two_log_likelihoods(std::span<const NoiseModel> noises, std::span<const double> time_s,
+                                              const RowNoise& rows, std::span<const char> usable,
+                                              std::span<const double> residual_v) {
+  std::vector<double> sums;
+  for (std::size_t first = 0; first < noises.size(); first += doubles_at_once) {
+    Squares<Lanes> squares{};
+    for (std::size_t lane = 0; lane < doubles_at_once; ++lane) {
+      const Squares<double> one = squares_of(noises[std::min(first + lane, noises.size() - 1)]);
+      squares.white_v2[lane] = one.white_v2;
+      squares.fast_v2[lane] = one.fast_v2;
+      squares.slow_v2[lane] = one.slow_v2;
+      squares.edge2[lane] = one.edge2;
+    }
+    Lanes of{};
+    arithmetic::in_widest_vectors([&] { add_costs(squares, noises[first], time_s, rows, usable, residual_v, of); });
+    for (std::size_t lane = 0; lane < doubles_at_once && first + lane < noises.size(); ++lane) sums.push_back(of[lane]);
   }
-  return squares + log_determinant.value();
+  return sums;
 }
 
 void Whitener::whiten(Eigen::Ref<Columns> columns) const {
@@ -138,12 +184,24 @@ void Whitener::whiten(Eigen::Ref<Columns> columns) const {
     whiten(0, {columns.data(), gains_.size()});
     return;
   }
-  const auto count = static_cast<std::size_t>(columns.cols());
+  // whole registers to each piece: their results do not depend on it
+  const auto count = static_cast<std::size_t>(columns.cols()),
+             registers = (count + doubles_at_once - 1) / doubles_at_once;
+  const bool large = static_cast<double>(columns.size()) > numerics.products.worth_a_thread;
+  const std::size_t pieces = large ? std::min(measurement::best_pieces(), registers) : 1;
+  measurement::in_parallel(pieces, [&](std::size_t k) {
+    const std::size_t first = k * registers / pieces * doubles_at_once,
+                      end = std::min(count, (k + 1) * registers / pieces * doubles_at_once);
+    whiten_some(columns.data() + first, end - first, columns.outerStride());
+  });
+}
+
+void Whitener::whiten_some(double* columns, std::size_t count, Eigen::Index stride) const {
   std::vector<double> fast(count), slow(count);
   arithmetic::in_widest_vectors([&] {
     for (std::size_t k = 0; k < gains_.size(); ++k) {
       const Gain& g = gains_[k];
-      double* row = columns.data() + static_cast<Eigen::Index>(k) * columns.outerStride();
+      double* row = columns + static_cast<Eigen::Index>(k) * stride;
       arithmetic::each_register(count, [&]<class Value>(std::size_t at) {
         arithmetic::Loaded<Value> x(row + at), f(fast.data() + at), s(slow.data() + at);
         if (g.weight > 0) {

@@ -76,15 +76,19 @@ class Whitener {
     double slow_size;               ///< standard deviation of the slow part over that on a flat OCV
     double weight;                  ///< 1 / standard deviation of the innovation; 0: row not used
   };
+  /// Some columns of a matrix whose rows are `stride` apart.
+  void whiten_some(double* columns, std::size_t count, Eigen::Index stride) const;
+
   std::vector<Gain> gains_;
   double log_determinant_ = 0;
   std::size_t used_ = 0;
 };
 
-/// -2 log likelihood of a residual by a noise model, without the constant: whitened and summed in one pass.
-/// As Whitener, for a residual of one column.
-double minus_two_log_likelihood(const NoiseModel& noise, std::span<const double> time_s, const RowNoise& rows,
-                                std::span<const char> usable, std::span<const double> residual_v);
+/// -2 log likelihoods of a residual by some noise models, without the constant: whitened and summed in one pass for
+/// several. As Whitener, for a residual of one column. All noise models have the same correlation times.
+std::vector<double> minus_two_log_likelihoods(std::span<const NoiseModel> noises, std::span<const double> time_s,
+                                              const RowNoise& rows, std::span<const char> usable,
+                                              std::span<const double> residual_v);
 
 /// Standard deviation of a voltage channel's white noise [V]: from second differences where the current moves by less
 /// than quiet_a, and at least that of the quantisation. fallback_v if there are too few such rows.

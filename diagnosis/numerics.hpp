@@ -45,6 +45,10 @@ struct Numerics {
     double ridge = 1e-9, ridge_share = 1e-12, ridge_reach = 1e-6, ridge_covariance = 1e-12;
   };
 
+  struct Products {
+    double worth_a_thread = 1e6;  ///< multiplications (half a millisecond) above which further threads begin sooner
+  };
+
   /// Linear algebra of signatures.
   struct Signatures {
     double probing_strength = 1e-6;            ///< of the upper bound: a strength just above its bound at 0
@@ -100,6 +104,7 @@ struct Numerics {
   double middle_soc = 0.5;  ///< at which a cell's R0, R1 and C1 are compared with a mechanism's
   Statistics statistics;
   Fit fit;
+  Products products;
   Signatures signatures;
   Noise noise;
   Search search;

@@ -7,6 +7,8 @@
 #include <vector>
 
 #include "arithmetic/vector_width.hpp"
+#include "diagnosis/numerics.hpp"
+#include "measurement/in_parallel.hpp"
 
 namespace bms::diagnosis {
 
@@ -87,26 +89,43 @@ void add_tile(const double* a, std::size_t a_stride, const double* b, std::size_
   tile.store(sum, stride);
 }
 
-/// symmetric: tiles that lie below the diagonal are left out.
-Eigen::MatrixXd sum_of_tiles(const AnyColumns& a, const AnyColumns& b, bool symmetric) {
+/// Rows of tiles that a thread sums: each so many, from the first on.
+struct Share {
+  std::size_t first, step;
+};
+
+/// Adds a share of the tiles of a' b to `sum`. symmetric: tiles that lie below the diagonal are left out.
+void add_tiles(const AnyColumns& a, const AnyColumns& b, bool symmetric, Share share, std::vector<double>& sum) {
   const auto rows_of_result = static_cast<std::size_t>(a.cols()),
              columns_of_result = static_cast<std::size_t>(b.cols());
   Strip strip_a(symmetric ? 0 : rows_of_result), strip_b(columns_of_result);
   const Strip& left = symmetric ? strip_b : strip_a;
   const std::size_t stride = whole(columns_of_result, tile_columns);
-  std::vector<double> sum(whole(rows_of_result, tile_rows) * stride, 0.0);
   for (Eigen::Index first = 0; first < a.rows(); first += static_cast<Eigen::Index>(rows_at_once)) {
     const Eigen::Index rows = std::min(static_cast<Eigen::Index>(rows_at_once), a.rows() - first);
     arithmetic::in_widest_vectors([&] {
       if (!symmetric) strip_a.take(a, first, rows);
       strip_b.take(b, first, rows);
-      for (std::size_t i = 0; i < rows_of_result; i += tile_rows) {
+      for (std::size_t i = share.first * tile_rows; i < rows_of_result; i += share.step * tile_rows) {
         for (std::size_t j = symmetric ? i / tile_columns * tile_columns : 0; j < columns_of_result; j += tile_columns)
           add_tile(left.column(i), left.stride(), strip_b.column(j), strip_b.stride(), static_cast<std::size_t>(rows),
                    sum.data() + i * stride + j, stride);
       }
     });
   }
+}
+
+/// symmetric: the upper triangle is summed.
+Eigen::MatrixXd sum_of_tiles(const AnyColumns& a, const AnyColumns& b, bool symmetric) {
+  const auto rows_of_result = static_cast<std::size_t>(a.cols()),
+             columns_of_result = static_cast<std::size_t>(b.cols());
+  const std::size_t stride = whole(columns_of_result, tile_columns),
+                    tiles = whole(rows_of_result, tile_rows) / tile_rows;
+  std::vector<double> sum(tiles * tile_rows * stride, 0.0);
+  const bool large = static_cast<double>(a.rows()) * static_cast<double>(a.cols()) * static_cast<double>(b.cols()) >
+                     numerics.products.worth_a_thread;
+  const std::size_t pieces = large ? std::min(measurement::best_pieces(), tiles) : 1;
+  measurement::in_parallel(pieces, [&](std::size_t k) { add_tiles(a, b, symmetric, {k, pieces}, sum); });
   Eigen::MatrixXd result(a.cols(), b.cols());
   for (std::size_t i = 0; i < rows_of_result; ++i) {
     for (std::size_t j = 0; j < columns_of_result; ++j) {

@@ -156,23 +156,18 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
   const double hopeless = c.mechanism == foremost.mechanism ? foremost.fit->cost : foremost.cost;
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
-  const Start cheapest = cheapest_start(h, around, foremost);
-  HypothesisFit best = likelihood_.fit(cheapest.hypothesis, cheapest.calibration, numerics.fit.iterations, hopeless);
-  for (const MechanismSetting& start : c.other_forms) {
-    HypothesisFit other =
-        likelihood_.fit(with(around.hypothesis, start), around.calibration, numerics.fit.iterations, hopeless);
-    if (other.cost < best.cost) best = std::move(other);
-  }
-  if (const auto joint = joint_start(h)) {
-    HypothesisFit other = likelihood_.fit(*joint, around.calibration, numerics.fit.iterations, hopeless);
-    if (other.cost < best.cost) best = std::move(other);
-  }
+  std::vector<Start> starts = {cheapest_start(h, around, foremost)};
+  for (const MechanismSetting& form : c.other_forms) starts.push_back({with(around.hypothesis, form), around.calibration});
+  if (const auto joint = joint_start(h)) starts.push_back({*joint, around.calibration});
   for (const Eigen::VectorXd& u : far_bases(around)) {
-    const auto farther = far_start(h, u);
-    if (!farther) continue;
-    HypothesisFit other = likelihood_.fit(farther->hypothesis, u, numerics.fit.iterations, hopeless);
-    if (other.cost < best.cost) best = std::move(other);
+    if (const auto farther = far_start(h, u)) starts.push_back({farther->hypothesis, u});
   }
+  std::vector<HypothesisFit> fits(starts.size());
+  measurement::in_parallel(starts.size(), [&](std::size_t k) {
+    fits[k] = likelihood_.fit(starts[k].hypothesis, starts[k].calibration, numerics.fit.iterations, hopeless);
+  });
+  HypothesisFit best = *std::min_element(
+      fits.begin(), fits.end(), [](const HypothesisFit& x, const HypothesisFit& y) { return x.cost < y.cost; });
   if (knowledge_of(c.mechanism).signature == Signature::contact_change) best = refined_onset(best);
   report(catalogue[c.mechanism].id);
   return best;
@@ -189,20 +184,22 @@ std::optional<Hypothesis> Search::joint_start(Hypothesis h) const {
   return h;
 }
 
-std::optional<Search::FarStart> Search::far_start(Hypothesis h, const Eigen::VectorXd& u) const {
-  MechanismSetting& s = h.settings.back();
-  const std::vector<std::vector<double>> starts = knowledge_of(s.index).far_starts(s, likelihood_.facts());
+std::optional<Search::FarStart> Search::far_start(const Hypothesis& h, const Eigen::VectorXd& u) const {
+  const std::vector<std::vector<double>> starts =
+      knowledge_of(h.settings.back().index).far_starts(h.settings.back(), likelihood_.facts());
   if (starts.empty()) return std::nullopt;
-  double least = likelihood_.residual(h, u).squaredNorm();
-  std::optional<FarStart> best;
-  for (const std::vector<double>& start : starts) {
-    std::copy(start.begin(), start.end(), s.value.begin());
-    const double cost = likelihood_.residual(h, u).squaredNorm();
-    if (cost >= least) continue;
-    least = cost;
-    best = {h, cost};
-  }
-  return best;
+  const auto at = [&h](const std::vector<double>& start) {
+    Hypothesis there = h;
+    std::copy(start.begin(), start.end(), there.settings.back().value.begin());
+    return there;
+  };
+  std::vector<double> costs(starts.size() + 1);
+  measurement::in_parallel(costs.size(), [&](std::size_t k) {
+    costs[k] = likelihood_.residual(k < starts.size() ? at(starts[k]) : h, u).squaredNorm();
+  });
+  const auto least = std::min_element(costs.begin(), costs.end() - 1);
+  if (!(*least < costs.back())) return std::nullopt;
+  return FarStart{at(starts[static_cast<std::size_t>(least - costs.begin())]), *least};
 }
 
 std::vector<char> Search::far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const {

@@ -114,7 +114,7 @@ class Search {
     double cost;  ///< |residual|^2
   };
   /// The best of some strengths far from the signature's estimate; nothing if none is better than it.
-  std::optional<FarStart> far_start(Hypothesis h, const Eigen::VectorXd& u) const;
+  std::optional<FarStart> far_start(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Base parameters for far starts: those of the fit, and those of the cell file, which the fit may have left because
   /// a mechanism is missing.
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;

@@ -6,15 +6,41 @@
 #include <cstddef>
 #include <exception>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace bms::measurement {
 
-/// Runs work(k) for k = 0 .. count - 1 in as many threads as there are processors. Rethrows the exception of the first
-/// k that threw, after all have ended.
+/// Processors that no call of in_parallel uses at present. Calls within a piece of work take those that are left.
+inline std::atomic<int>& idle_processors() {
+  static std::atomic<int> idle = static_cast<int>(std::max(1U, std::thread::hardware_concurrency())) - 1;
+  return idle;
+}
+
+/// Pieces into which work that can be cut as one likes is best cut at present: one if no other processor is idle.
+inline std::size_t best_pieces() { return static_cast<std::size_t>(std::max(0, idle_processors().load())) + 1; }
+
+/// Takes an idle processor for its lifetime, if there is one.
+class IdleProcessor {
+ public:
+  IdleProcessor() : taken_(idle_processors()-- > 0) {
+    if (!taken_) ++idle_processors();
+  }
+  IdleProcessor(IdleProcessor&& o) noexcept : taken_(std::exchange(o.taken_, false)) {}
+  IdleProcessor& operator=(IdleProcessor&&) = delete;
+  ~IdleProcessor() {
+    if (taken_) ++idle_processors();
+  }
+  explicit operator bool() const { return taken_; }
+
+ private:
+  bool taken_;
+};
+
+/// Runs work(k) for k = 0 .. count - 1, in this thread and in one for each processor that is idle. Rethrows the
+/// exception of the first k that threw, after all have ended.
 template <class Work>
 void in_parallel(std::size_t count, const Work& work) {
-  const std::size_t threads = std::min<std::size_t>(count, std::max(1U, std::thread::hardware_concurrency()));
   std::atomic<std::size_t> next = 0;
   std::vector<std::exception_ptr> thrown(count);
   const auto take = [&] {
@@ -27,9 +53,16 @@ void in_parallel(std::size_t count, const Work& work) {
     }
   };
   std::vector<std::thread> others;
-  for (std::size_t k = 1; k < threads; ++k) others.emplace_back(take);
+  while (others.size() + 1 < count) {
+    IdleProcessor processor;
+    if (!processor) break;
+    // given back as soon as nothing is left to take: what the last pieces call may use it
+    others.emplace_back([&take, held = std::move(processor)] { take(); });
+  }
   take();
+  ++idle_processors();  // this one, while it waits
   for (std::thread& t : others) t.join();
+  --idle_processors();
   for (const std::exception_ptr& e : thrown) {
     if (e) std::rethrow_exception(e);
   }

@@ -1,15 +1,14 @@
 #include "proof/proof.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <exception>
 #include <filesystem>
-#include <thread>
 
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "measurement/in_parallel.hpp"
 #include "proof/experiment_file.hpp"
 #include "proof/proof_lab.hpp"
 
@@ -67,29 +66,17 @@ ProofClaim failure(const Experiment& e, const std::string& what) {
 
 /// Runs the experiments on all processors. results: one for each.
 void run_all(const std::vector<const Experiment*>& chosen, ProofLab& lab, std::vector<ProofExperiment>& results) {
-  std::atomic<std::size_t> next = 0;
-  std::exception_ptr bad_input;
-  std::mutex mutex;
-  const auto work = [&] {
-    for (std::size_t k = next++; k < chosen.size(); k = next++) {
-      const Experiment& e = *chosen[k];
-      try {
-        e.procedure->run(lab, results[k]);
-        results[k].notes.insert(results[k].notes.end(), e.notes.begin(), e.notes.end());
-      } catch (const files::BadInput&) {
-        const std::lock_guard lock(mutex);
-        if (!bad_input) bad_input = std::current_exception();
-      } catch (const std::exception& error) {
-        results[k].claims.push_back(failure(e, error.what()));
-      }
+  measurement::in_parallel(chosen.size(), [&](std::size_t k) {
+    const Experiment& e = *chosen[k];
+    try {
+      e.procedure->run(lab, results[k]);
+      results[k].notes.insert(results[k].notes.end(), e.notes.begin(), e.notes.end());
+    } catch (const files::BadInput&) {
+      throw;
+    } catch (const std::exception& error) {
+      results[k].claims.push_back(failure(e, error.what()));
     }
-  };
-  const std::size_t threads = std::min<std::size_t>(std::max(1U, std::thread::hardware_concurrency()), chosen.size());
-  std::vector<std::thread> others;
-  for (std::size_t n = 1; n < threads; ++n) others.emplace_back(work);
-  work();
-  for (std::thread& other : others) other.join();
-  if (bad_input) std::rethrow_exception(bad_input);
+  });
 }
 
 }  // namespace
