@@ -168,14 +168,18 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
   return e;
 }
 
-/// Tries steps with growing damping until one lowers the cost.
+/// Tries steps with growing damping until one lowers the cost, or promises too little to matter.
 GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
   StepBounds room{Eigen::VectorXd(m_), Eigen::VectorXd(m_)};
   for (Eigen::Index j = 0; j < m_; ++j)
     std::tie(room.low[j], room.high[j]) = parameters_.room(j, parameters_.of(fit_.hypothesis, j));
+  const double quiet = fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost;
   Attempt result;
   for (int attempt = 0; attempt < fit_numerics.attempts && !result.better; ++attempt) {
     const Eigen::VectorXd step = m_ > 0 ? bounded_step(schur_, e.rhs, damping_, room) : Eigen::VectorXd();
+    double promised = e.u_gradient.dot(e.u_alone);
+    if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
+    if (attempt > 0 && promised < quiet) break;
     Hypothesis trial = fit_.hypothesis;
     for (Eigen::Index j = 0; j < m_; ++j)
       parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);
@@ -185,18 +189,16 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
     if (m_ > 0) toward -= e.solved * step;
     const Eigen::VectorXd u = fit_.calibration + way * toward;
     const Eigen::VectorXd residual = likelihood_.residual(trial, u);
-    const double cost = cost_of(trial, u, residual);
-    double promised = e.u_gradient.dot(e.u_alone);
-    if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
-    if (fit_.cost - cost < fit_numerics.kept_promise * promised &&
+    const double cost = cost_of(trial, u, residual), gained = fit_.cost - cost;
+    if (gained < fit_numerics.kept_promise * promised &&
         promised > fit_numerics.promise + fit_numerics.promise_share * fit_.cost)
       result.astray = true;
-    if (!(cost < fit_.cost)) {  // also where there is no number
+    if (!(gained > 0)) {  // also where there is no number
       damping_ *= fit_numerics.damping_more;
       continue;
     }
     result.better = true;
-    quiet_ = fit_.cost - cost < fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost ? quiet_ + 1 : 0;
+    quiet_ = gained < quiet ? quiet_ + 1 : 0;
     fit_.hypothesis = trial;
     fit_.calibration = u;
     fit_.residual = residual;
