@@ -8,7 +8,7 @@
 #include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/products.hpp"
-#include "diagnosis/symmetric_eigen.hpp"
+#include "measurement/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -56,12 +56,12 @@ Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::Vecto
   if (root.info() != Eigen::Success) return covariance;
   const Eigen::MatrixXd l = root.matrixL();
   const Eigen::MatrixXd rest = l.transpose() * prior.asDiagonal() * l;
-  const SymmetricEigen known = symmetric_eigen(rest);
+  const measurement::SymmetricEigen known = measurement::symmetric_eigen(rest);
   const Eigen::VectorXd share = (1 - known.values.array()).cwiseMax(numerics.fit.ridge);  // known from data
   const Eigen::MatrixXd data_root = known.vectors * share.cwiseSqrt().asDiagonal();
   const Eigen::MatrixXd back = share.cwiseSqrt().cwiseInverse().asDiagonal() * known.vectors.transpose();
   const Eigen::MatrixXd turned = back * l.transpose();
-  const SymmetricEigen spread = symmetric_eigen(turned * pulls * turned.transpose());
+  const measurement::SymmetricEigen spread = measurement::symmetric_eigen(turned * pulls * turned.transpose());
   const Eigen::VectorXd weaker = spread.values.cwiseMax(1).cwiseInverse();
   const Eigen::MatrixXd data = data_root * spread.vectors;
   const Eigen::MatrixXd precision = data * weaker.asDiagonal() * data.transpose() + rest;
