@@ -37,10 +37,9 @@ Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit
 /// 1 / variance of what is known of each estimated parameter before any voltage is looked at; 0: nothing.
 Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const FitParameters parameters(likelihood.cell(), fit.hypothesis);
-  Hypothesis at = fit.hypothesis;
   Eigen::VectorXd precision = Eigen::VectorXd::Zero(parameters.size());
   for (Eigen::Index j = 0; j < parameters.size(); ++j) {
-    const double sigma = parameters.known_within(j, parameters.of(at, j));
+    const double sigma = parameters.known_within(j, parameters.of(fit.hypothesis, j));
     if (sigma > 0) precision[j] = 1 / (sigma * sigma);
   }
   return precision;
