@@ -204,11 +204,6 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
 
 }  // namespace
 
-const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws) {
-  const auto most = std::find_if(laws.begin(), laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  return most == laws.end() || most->gain < evidence_limits.least ? nullptr : &*most;
-}
-
 bool follows_in_leaps(const PreparedRecording& r) {
   std::vector<double> read, moves;
   for (const double v : r.voltage_v) {

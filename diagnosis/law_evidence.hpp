@@ -25,9 +25,6 @@ struct LawEvidence {
 /// The largest first; the best form of each law.
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
-/// The law with the most evidence; nullptr if none has enough to be named.
-const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws);
-
 /// Returns true if the voltage's reading often stands still, and never moves by less than several of the steps that it
 /// can resolve: it stands until the voltage has left it by a threshold.
 bool follows_in_leaps(const PreparedRecording& r);
