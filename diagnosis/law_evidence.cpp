@@ -204,6 +204,12 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
 
 }  // namespace
 
+bool is_doubted(const std::vector<LawEvidence>& laws, double gain, double remaining) {
+  double foreign = 0;
+  for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
+  return remaining > 0 && foreign > gain - remaining - thresholds.decision.tie;
+}
+
 bool follows_in_leaps(const PreparedRecording& r) {
   std::vector<double> read, moves;
   for (const double v : r.voltage_v) {
