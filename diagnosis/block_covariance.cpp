@@ -45,15 +45,25 @@ Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const Hypothe
   return precision;
 }
 
+/// l with l l' = covariance. Where rounding has left a covariance that has none, of a wider one that has: with the
+/// least variances, in units of the standard deviations, raised above rounding.
+Eigen::MatrixXd factor_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  if (root.info() == Eigen::Success) return root.matrixL();
+  const Eigen::VectorXd variance = covariance.diagonal().cwiseAbs(),
+                        unit = (variance.array() > 0).select(variance.cwiseSqrt(), 1.0);
+  const measurement::SymmetricEigen axes =
+      measurement::symmetric_eigen(unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal());
+  return unit.asDiagonal() * axes.vectors * axes.values.cwiseMax(numerics.fit.ridge).cwiseSqrt().asDiagonal();
+}
+
 /// Covariance from what the data say, as uncertain in each direction as their pulls are there, but not less than by the
 /// covariance of the fit; and from the prior, which the error of the model leaves as it is.
 /// pulls: covariance of the data's pulls. prior: precision of each parameter.
 Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior,
                            const Eigen::MatrixXd& pulls) {
   // in coordinates in which the covariance of the fit is 1: data + rest = 1
-  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-  if (root.info() != Eigen::Success) return covariance;
-  const Eigen::MatrixXd l = root.matrixL();
+  const Eigen::MatrixXd l = factor_of(covariance);
   const Eigen::MatrixXd rest = l.transpose() * prior.asDiagonal() * l;
   const measurement::SymmetricEigen known = measurement::symmetric_eigen(rest);
   const Eigen::VectorXd share = (1 - known.values.array()).cwiseMax(numerics.fit.ridge);  // known from data
