@@ -13,6 +13,7 @@
 #include <string>
 
 #include "files/temporary_folder.hpp"
+#include "images/child_process.hpp"  // for the tests that start the tool themselves
 
 namespace bms {
 
