@@ -1,7 +1,5 @@
 #include "benchmark/real_cell.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <string>
@@ -10,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "files/recording.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "workflow/diagnose_recordings.hpp"
 #include "workflow/identify_cell.hpp"
@@ -19,10 +18,6 @@ namespace bms::benchmark {
 namespace {
 
 using measurement::Recording;
-
-/// Parts of a recording, in files of this process alone: several programs may run at once.
-const std::string calibration_part = fmt::format("calibration_{}.csv", getpid()),
-                  test_part = fmt::format("test_{}.csv", getpid());
 
 /// Rows of a recording from `first` on.
 Recording part(const Recording& r, std::size_t first, std::size_t count) {
@@ -88,16 +83,16 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   options.ocv_from_load = set.ocv_from_load;
   if (set.initial_soc) options.initial_soc = {set.initial_soc, false};
   Prepared p;
-  const std::filesystem::path folder = std::filesystem::temp_directory_path();
+  const files::TemporaryFolder folder;  // for parts of a recording
+  const auto save = [&](const std::string& name, const Recording& whole, std::size_t first, std::size_t end) {
+    files::write_file(folder.path() / name, csv_of(part(whole, first, end)));
+    return (folder.path() / name).string();
+  };
   std::string test = path(set.test);
   if (set.test.empty()) {
     const Recording whole = files::read_recording(path(set.calibration.front()));
-    const auto save = [&](const std::string& name, std::size_t first, std::size_t end) {
-      files::write_file((folder / name).string(), csv_of(part(whole, first, end)));
-      return (folder / name).string();
-    };
-    options.recordings = {save(calibration_part, 0, whole.rows() / 2)};
-    test = save(test_part, whole.rows() / 2, whole.rows());
+    options.recordings = {save("calibration.csv", whole, 0, whole.rows() / 2)};
+    test = save("test.csv", whole, whole.rows() / 2, whole.rows());
   } else {
     for (const std::string& name : set.calibration) options.recordings.push_back(path(name));
     if (!set.calibration_current.empty()) {
@@ -106,9 +101,8 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
       const Recording whole =
           files::read_recording(options.recordings.front(), files::VoltageColumn::required, reading);
       const auto first = std::lower_bound(whole.time_s.begin(), whole.time_s.end(), set.calibration_from_s);
-      files::write_file((folder / calibration_part).string(),
-                        csv_of(part(whole, static_cast<std::size_t>(first - whole.time_s.begin()), whole.rows())));
-      options.recordings = {(folder / calibration_part).string()};
+      options.recordings = {
+          save("calibration.csv", whole, static_cast<std::size_t>(first - whole.time_s.begin()), whole.rows())};
     }
   }
   for (const std::string& name : set.healthy) options.healthy.push_back(path(name));
@@ -119,7 +113,6 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   if (set.cells_in_parallel > 1) workflow::scale_to(set.cells_in_parallel * p.cell.parameters.capacity_ah, p.cell);
   p.test = workflow::read_for_diagnosis(test, {}, p.cell);
   if (set.test_initial_soc && !p.test.soc_ref.empty()) p.test.soc_ref.edit().front() = *set.test_initial_soc;
-  for (const std::string& name : {calibration_part, test_part}) std::filesystem::remove(folder / name);
   return p;
 }
 

@@ -8,7 +8,7 @@
 #include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/products.hpp"
-#include "diagnosis/symmetric_eigen.hpp"
+#include "measurement/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -37,13 +37,24 @@ Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit
 /// 1 / variance of what is known of each estimated parameter before any voltage is looked at; 0: nothing.
 Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const FitParameters parameters(likelihood.cell(), fit.hypothesis);
-  Hypothesis at = fit.hypothesis;
   Eigen::VectorXd precision = Eigen::VectorXd::Zero(parameters.size());
   for (Eigen::Index j = 0; j < parameters.size(); ++j) {
-    const double sigma = parameters.known_within(j, parameters.of(at, j));
+    const double sigma = parameters.known_within(j, parameters.of(fit.hypothesis, j));
     if (sigma > 0) precision[j] = 1 / (sigma * sigma);
   }
   return precision;
+}
+
+/// l with l l' = covariance. Where rounding has left a covariance that has none, of a wider one that has: with the
+/// least variances, in units of the standard deviations, raised above rounding.
+Eigen::MatrixXd factor_of(const Eigen::MatrixXd& covariance) {
+  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
+  if (root.info() == Eigen::Success) return root.matrixL();
+  const Eigen::VectorXd variance = covariance.diagonal().cwiseAbs(),
+                        unit = (variance.array() > 0).select(variance.cwiseSqrt(), 1.0);
+  const measurement::SymmetricEigen axes =
+      measurement::symmetric_eigen(unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal());
+  return unit.asDiagonal() * axes.vectors * axes.values.cwiseMax(numerics.fit.ridge).cwiseSqrt().asDiagonal();
 }
 
 /// Covariance from what the data say, as uncertain in each direction as their pulls are there, but not less than by the
@@ -52,16 +63,14 @@ Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const Hypothe
 Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::VectorXd& prior,
                            const Eigen::MatrixXd& pulls) {
   // in coordinates in which the covariance of the fit is 1: data + rest = 1
-  const Eigen::LLT<Eigen::MatrixXd> root(covariance);
-  if (root.info() != Eigen::Success) return covariance;
-  const Eigen::MatrixXd l = root.matrixL();
+  const Eigen::MatrixXd l = factor_of(covariance);
   const Eigen::MatrixXd rest = l.transpose() * prior.asDiagonal() * l;
-  const SymmetricEigen known = symmetric_eigen(rest);
+  const measurement::SymmetricEigen known = measurement::symmetric_eigen(rest);
   const Eigen::VectorXd share = (1 - known.values.array()).cwiseMax(numerics.fit.ridge);  // known from data
   const Eigen::MatrixXd data_root = known.vectors * share.cwiseSqrt().asDiagonal();
   const Eigen::MatrixXd back = share.cwiseSqrt().cwiseInverse().asDiagonal() * known.vectors.transpose();
   const Eigen::MatrixXd turned = back * l.transpose();
-  const SymmetricEigen spread = symmetric_eigen(turned * pulls * turned.transpose());
+  const measurement::SymmetricEigen spread = measurement::symmetric_eigen(turned * pulls * turned.transpose());
   const Eigen::VectorXd weaker = spread.values.cwiseMax(1).cwiseInverse();
   const Eigen::MatrixXd data = data_root * spread.vectors;
   const Eigen::MatrixXd precision = data * weaker.asDiagonal() * data.transpose() + rest;

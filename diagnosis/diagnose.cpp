@@ -189,10 +189,7 @@ void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, 
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
   std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {
-    double foreign = 0;
-    for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
-    // what the causes leave counts against them; where it is nothing, no law can be missing
-    if (foreign <= d.base_cost - d.best_cost - d.remaining - thresholds.decision.tie || d.remaining <= 0) return;
+    if (!is_doubted(laws, d.base_cost - d.best_cost, d.remaining)) return;
     d.verdict = Verdict::unknown;
   }
   d.law = learn_law_term(likelihood, nominal, std::move(laws));

@@ -18,7 +18,7 @@ double EffectGain::cost_of(const Columns& raw, const Eigen::VectorXd& calibratio
 }
 
 double EffectGain::of(const MechanismSetting& setting) const {
-  Hypothesis changed = with(control_.hypothesis, setting);
+  const Hypothesis changed = with(control_.hypothesis, setting);
   Columns effect = Columns::Zero(static_cast<Eigen::Index>(likelihood_.samples()), 1);
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < likelihood_.records().size(); ++r) {

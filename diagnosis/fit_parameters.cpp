@@ -76,7 +76,7 @@ double FitParameters::known_within(Eigen::Index j, double v) const {
   return is_shape(j) ? thresholds.priors.log_sigma * v : at(j).usual.spread;
 }
 
-double FitParameters::prior(Hypothesis& h) const {
+double FitParameters::prior(const Hypothesis& h) const {
   double sum = 0;
   for (Eigen::Index j = 0; j < size(); ++j) sum += std::pow(prior_distance(j, of(h, j)).away, 2);
   return sum;

@@ -29,6 +29,10 @@ class FitParameters {
     const ParameterRef& s = sought_[static_cast<std::size_t>(j)];
     return h.settings[s.setting].value[s.parameter];
   }
+  double of(const Hypothesis& h, Eigen::Index j) const {
+    const ParameterRef& s = sought_[static_cast<std::size_t>(j)];
+    return h.settings[s.setting].value[s.parameter];
+  }
 
   bool is_shape(Eigen::Index j) const { return at(j).parameter->role == model::Role::shape; }
   double clamped(Eigen::Index j, double v) const;
@@ -46,7 +50,7 @@ class FitParameters {
   /// rare is not counted: it says little of which one it is.
   double known_within(Eigen::Index j, double v) const;
   /// -2 log prior of all.
-  double prior(Hypothesis& h) const;
+  double prior(const Hypothesis& h) const;
 
  private:
   struct Parameter {

@@ -10,10 +10,10 @@
 #include "diagnosis/generic_columns.hpp"
 #include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/residual_projection.hpp"
-#include "diagnosis/symmetric_eigen.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
+#include "measurement/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -159,7 +159,7 @@ Columns law_columns(const LikelihoodModel& likelihood, const HypothesisFit& fit)
 
 /// With the width of the prior that has the most evidence.
 double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
-  const SymmetricEigen eigen = symmetric_eigen(gram);
+  const measurement::SymmetricEigen eigen = measurement::symmetric_eigen(gram);
   const Eigen::VectorXd power = eigen.values.cwiseMax(0.0),
                         along = (eigen.vectors.transpose() * toward).array().square();
   double best = 0;
@@ -204,9 +204,10 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
 
 }  // namespace
 
-const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws) {
-  const auto most = std::find_if(laws.begin(), laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
-  return most == laws.end() || most->gain < evidence_limits.least ? nullptr : &*most;
+bool is_doubted(const std::vector<LawEvidence>& laws, double gain, double remaining) {
+  double foreign = 0;
+  for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
+  return remaining > 0 && foreign > gain - remaining - thresholds.decision.tie;
 }
 
 bool follows_in_leaps(const PreparedRecording& r) {

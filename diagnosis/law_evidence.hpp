@@ -25,8 +25,10 @@ struct LawEvidence {
 /// The largest first; the best form of each law.
 std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
-/// The law with the most evidence; nullptr if none has enough to be named.
-const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws);
+/// Returns true if a law that no mechanism changes explains more than the causes that are named, or less by no more
+/// than a tie. gain: of the causes. remaining: what they leave, which counts against them; where it is nothing, no law
+/// can be missing.
+bool is_doubted(const std::vector<LawEvidence>& laws, double gain, double remaining);
 
 /// Returns true if the voltage's reading often stands still, and never moves by less than several of the steps that it
 /// can resolve: it stands until the voltage has left it by a threshold.

@@ -143,6 +143,12 @@ std::optional<model::CellParameters<>> fitted_cell(const LikelihoodModel& likeli
   return model::first_fault(cell).what == nullptr ? std::optional(cell) : std::nullopt;
 }
 
+/// The law with the most evidence; nullptr if none has enough to be named. laws: the largest first.
+const LawEvidence* likeliest_law(const std::vector<LawEvidence>& laws) {
+  const auto most = std::find_if(laws.begin(), laws.end(), [](const LawEvidence& e) { return e.law[0] != 0; });
+  return most == laws.end() || most->gain < law_thresholds.law.least ? nullptr : &*most;
+}
+
 /// Learns the term of a law with a table, if it pays on what is left out.
 void learn_table(const LikelihoodModel& likelihood, const NoiseModel& nominal, const TableLaw& law, LawTerm& term) {
   std::vector<TermModel> models = {TermModel{}};

@@ -48,8 +48,8 @@ std::vector<View> views_from(const HypothesisFit& fit, const FitParameters& para
   std::vector<View> views;
   for (Eigen::Index j = 0; j < parameters.size(); ++j) {
     const ParameterRef& p = parameters.sought()[static_cast<std::size_t>(j)];
-    Hypothesis at = fit.hypothesis;
-    const double value = parameters.of(at, j), sigma = at.settings[p.setting].deviation[p.parameter];
+    const double value = parameters.of(fit.hypothesis, j),
+                 sigma = fit.hypothesis.settings[p.setting].deviation[p.parameter];
     if (p.parameter > 0 || parameters.is_shape(j) || !(sigma > 0)) continue;
     for (const double times : profile_sigmas) {
       for (const double sign : {-1.0, 1.0}) {

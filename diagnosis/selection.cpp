@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/credibility.hpp"
@@ -49,6 +51,9 @@ std::size_t partner_of(const HypothesisFit& f, std::size_t mechanism) {
   return partner;
 }
 
+/// What decides which mechanism goes first.
+using CertainAndGain = std::pair<bool, double>;
+
 /// The elimination in progress.
 class Elimination {
  public:
@@ -78,24 +83,21 @@ class Elimination {
       without[found_.best.hypothesis.added().front()] = control_;
     else
       without = search_.without_each(found_.best);
-    struct Needless {
-      bool certain;
-      double gain;
-      std::size_t mechanism = no_mechanism;
-    } least{};
     for (const std::size_t m : found_.best.hypothesis.added()) {
-      const double gain = found_.gains[m] = search_.gain(without[m], found_.best);
-      if (gain < 0 && begins_better(m, without[m])) return true;
-      const bool needed =
-          gain >= selection_limits.detected && is_credible(found_.best, m) &&
-          (alone || (counts(m, gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without[m], rms_v)));
-      const bool certain = scope_.expected.contains(m);
-      if (!needed &&
-          (least.mechanism == no_mechanism || std::pair(certain, gain) < std::pair(least.certain, least.gain)))
-        least = {certain, gain, m};
+      found_.gains[m] = search_.gain(without[m], found_.best);
+      if (found_.gains[m] < 0 && begins_better(m, without[m])) return true;
     }
-    if (least.mechanism != no_mechanism) {
-      found_.best = std::move(without[least.mechanism]);
+    const std::size_t needless =
+        least_of_those_that_go(found_.best.hypothesis.added(), [&](std::size_t m) -> std::optional<CertainAndGain> {
+          const double gain = found_.gains[m];
+          const bool needed =
+              gain >= selection_limits.detected && is_credible(found_.best, m) &&
+              (alone || (counts(m, gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without[m], rms_v)));
+          if (needed) return std::nullopt;
+          return CertainAndGain(scope_.expected.contains(m), gain);
+        });
+    if (needless != no_mechanism) {
+      found_.best = std::move(without[needless]);
       return true;
     }
     for (const auto& [m, rest] : without) {
@@ -167,12 +169,11 @@ class Elimination {
   bool drop_one_not_credible() {
     const std::vector<std::size_t> added = found_.best.hypothesis.added();
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
-    std::size_t worst = no_mechanism;
-    for (const std::size_t m : added) {
+    const std::size_t worst = least_of_those_that_go(added, [&](std::size_t m) -> std::optional<double> {
       const bool too_large = added.size() > 1 && is_too_large(m, rms_v.at(m));
-      if (!too_large && is_credible(found_.best, m)) continue;
-      if (worst == no_mechanism || rms_v.at(m) > rms_v.at(worst)) worst = m;
-    }
+      if (!too_large && is_credible(found_.best, m)) return std::nullopt;
+      return -rms_v.at(m);
+    });
     if (worst == no_mechanism) return false;
     const std::size_t partner = partner_of(found_.best, worst);
     HypothesisFit without = added.size() == 1 ? control_ : search_.without_one(found_.best, worst);
@@ -356,14 +357,15 @@ Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const H
     likelihood.set_noise(found.best.noise);
     HypothesisFit with_error = found.best;
     include_model_error(likelihood, with_error);
-    std::size_t weakest = no_mechanism;
-    for (const std::size_t m : with_error.hypothesis.added()) {
-      if (scope.expected.contains(m) || !is_uncertain(with_error, m, scope.expected)) continue;
-      // far from an ellipse the deviations say less than the gain, which the error of the model makes too large as well
-      const double too_large = widening(found.best.hypothesis, with_error.hypothesis, m);
-      if (found.gains[m] > selection_limits.own_sigmas * selection_limits.own_sigmas * too_large) continue;
-      if (weakest == no_mechanism || found.gains[m] < found.gains[weakest]) weakest = m;
-    }
+    const std::size_t weakest =
+        least_of_those_that_go(with_error.hypothesis.added(), [&](std::size_t m) -> std::optional<double> {
+          if (scope.expected.contains(m) || !is_uncertain(with_error, m, scope.expected)) return std::nullopt;
+          // far from an ellipse the deviations say less than the gain, which the error of the model makes too large
+          const double too_large = widening(found.best.hypothesis, with_error.hypothesis, m);
+          if (found.gains[m] > selection_limits.own_sigmas * selection_limits.own_sigmas * too_large)
+            return std::nullopt;
+          return found.gains[m];
+        });
     if (weakest == no_mechanism) return found;
     found = without_one(search, control, found, weakest);
   }

@@ -45,6 +45,21 @@ struct Survivors {
 Survivors eliminate(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                     const HypothesisFit& grown, const Scope& scope);
 
+/// Of mechanisms that may not stay, the one with the least weight, the first of equals; no_mechanism if all may stay.
+/// weight(mechanism): nothing if it may stay.
+template <class Weight>
+std::size_t least_of_those_that_go(const std::vector<std::size_t>& mechanisms, Weight&& weight) {
+  decltype(weight(no_mechanism)) least;
+  std::size_t goes = no_mechanism;
+  for (const std::size_t m : mechanisms) {
+    const auto of = weight(m);
+    if (!of || (least && !(*of < *least))) continue;
+    least = of;
+    goes = m;
+  }
+  return goes;
+}
+
 /// The rest fitted again without a mechanism, with its gains.
 Survivors without_one(Search& search, const HypothesisFit& control, const Survivors& found, std::size_t mechanism);
 

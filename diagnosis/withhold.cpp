@@ -1,13 +1,11 @@
 #include "diagnosis/withhold.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "diagnosis/healthy_coverage.hpp"
 #include "diagnosis/one_current.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "diagnosis/true_current.hpp"
-#include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
 
@@ -23,19 +21,6 @@ double total_duration_s(const std::vector<PreparedRecording>& records) {
 
 bool is_of_current(std::size_t m) {
   return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
-}
-
-/// RMS error of a fit [V].
-double error_of(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
-  measurement::MeanSquare error;
-  for (std::size_t r = 0; r < likelihood.records().size(); ++r) {
-    const std::vector<double> fitted_v = likelihood.voltage(fit.hypothesis, fit.calibration, r);
-    for (std::size_t k = 0; k < fitted_v.size(); ++k) {
-      const double e = likelihood.records()[r].voltage_v[k] - fitted_v[k];
-      if (std::isfinite(e)) error.add(e);
-    }
-  }
-  return error.root();
 }
 
 }  // namespace
@@ -83,21 +68,22 @@ HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) cons
 }
 
 std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
-  std::optional<Withheld> least;
-  for (const std::size_t m : found.best.hypothesis.added()) {
-    const double gain = found.gains.at(m);
-    const HealthyComparison c = compare(m, gain);
-    const bool less = !least || c.false_alarm > least->healthy.false_alarm ||
-                      (c.false_alarm == least->healthy.false_alarm && gain < least->gain);
-    if (!c.stands_out && less) least = Withheld{m, *found.best.hypothesis.find(m), gain, c, false};
-  }
-  return least;
+  using AlarmAndGain = std::pair<double, double>;
+  const std::size_t least =
+      least_of_those_that_go(found.best.hypothesis.added(), [&](std::size_t m) -> std::optional<AlarmAndGain> {
+        const HealthyComparison c = compare(m, found.gains.at(m));
+        if (c.stands_out) return std::nullopt;
+        return AlarmAndGain(-c.false_alarm, found.gains.at(m));
+      });
+  if (least == no_mechanism) return std::nullopt;
+  const double gain = found.gains.at(least);
+  return Withheld{least, *found.best.hypothesis.find(least), gain, compare(least, gain), false};
 }
 
 HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
   const std::vector<std::size_t> added = fit.hypothesis.added();
   if (std::none_of(added.begin(), added.end(), is_of_current)) return {};
-  if (error_of(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return {};
+  if (fitted_error_v(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return {};
   return coverage_of(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
 }
 

@@ -6,6 +6,7 @@
 #include <array>
 #include <stdexcept>
 
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "hal/pipe_format.hpp"
 #include "hil/board_link.hpp"
@@ -131,7 +132,7 @@ class EmulatedLink : public BoardLink {
     return std::runtime_error("the emulated board has stopped: " + files::read_file(folder_.path() / "log"));
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::filesystem::path to_path_, from_path_;
   FileDescriptor to_, from_;
   images::ChildProcess emulator_;

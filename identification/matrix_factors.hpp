@@ -13,13 +13,6 @@ struct ThinSvd {
 };
 ThinSvd thin_svd(const Eigen::MatrixXd& a);
 
-/// A = vectors diag(values) vectors' of a symmetric A, values in ascending order.
-struct SymmetricEigen {
-  Eigen::VectorXd values;
-  Eigen::MatrixXd vectors;
-};
-SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a);
-
 /// The x that minimises |A x - b|, by QR with column pivoting. Columns whose pivot is at most `dependent` times the
 /// largest are left out; 0: below rounding.
 Eigen::VectorXd solve_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double dependent = 0);

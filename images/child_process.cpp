@@ -11,6 +11,7 @@
 #include <stdexcept>
 #include <system_error>
 
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 
 extern char** environ;
@@ -56,7 +57,7 @@ int ChildProcess::wait() {
 }
 
 std::string output_of(const std::vector<std::string>& argv) {
-  const TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto log = folder.path() / "log";
   const int status = ChildProcess(argv, log).wait();
   std::string text = files::read_file(log);
@@ -73,18 +74,6 @@ bool in_path(const std::string& program) {
     folders = end == std::string::npos ? "" : folders.substr(end + 1);
   }
   return false;
-}
-
-TemporaryFolder::TemporaryFolder() {
-  std::string name = (std::filesystem::temp_directory_path() / "bms.XXXXXX").string();
-  if (mkdtemp(name.data()) == nullptr)
-    throw std::runtime_error("cannot create a temporary folder: " + std::generic_category().message(errno));
-  path_ = name;
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
 }
 
 }  // namespace bms::images

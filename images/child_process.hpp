@@ -37,17 +37,4 @@ std::string output_of(const std::vector<std::string>& argv);
 /// Returns true if an executable of that name is in PATH.
 bool in_path(const std::string& program);
 
-/// A new folder for temporary files. The destructor removes it with its content.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  std::filesystem::path path_;
-};
-
 }  // namespace bms::images

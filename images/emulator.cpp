@@ -10,6 +10,7 @@
 #include <stdexcept>
 
 #include "files/bad_input.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "hal/stream_format.hpp"
 #include "images/child_process.hpp"
@@ -93,7 +94,7 @@ BoardRun run_on_board(const EmulatedBoard& board, const std::filesystem::path& i
                       const std::vector<measurement::Sample>& samples,
                       const std::optional<measurement::StartingPoint>& start, const std::vector<std::string>& more,
                       std::size_t states) {
-  const TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto in = folder.path() / "samples", out = folder.path() / "estimates", log = folder.path() / "log";
   write_stream(in, samples, start);
   const Pipe pipe(out);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "files/bad_input.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
 
@@ -100,7 +101,7 @@ SourceTree sources_of_commit(const std::string& commit) {
   const auto place = present.builds / "of_commits" / id.substr(0, 12), folder = place / "source";
   if (!fs::exists(folder)) {
     fs::create_directories(place);
-    const TemporaryFolder temporary;
+    const files::TemporaryFolder temporary;
     const auto archive = temporary.path() / "source.tar", unpacked = place / ("unpacking." + std::to_string(getpid()));
     fs::create_directories(unpacked);
     output_of({"git", "-C", present.folder.string(), "archive", "--format=tar", "-o", archive.string(), id});

@@ -10,6 +10,7 @@
 #include "benchmark/score.hpp"
 #include "benchmark/tables.hpp"
 #include "files/committed_figures.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 
 namespace bms::benchmark {
@@ -129,7 +130,8 @@ TEST(Tables, EveryMethodHasAColumnAndEveryConfusionARow) {
 }
 
 TEST(Tables, AReadmeKeepsTheTextAroundTheTables) {
-  const std::filesystem::path readme = std::filesystem::temp_directory_path() / "bms_benchmark_readme_test.md";
+  const files::TemporaryFolder folder;
+  const std::filesystem::path readme = folder.path() / "README.md";
   const std::string before = "# x\n<!-- figures: development -->\n",
                     after = "<!-- end of figures -->\n<!-- figures: final -->\nNot run yet.\n<!-- end of figures -->\n";
   files::write_file(readme, before + "old\n" + after);
@@ -140,7 +142,6 @@ TEST(Tables, AReadmeKeepsTheTextAroundTheTables) {
     EXPECT_EQ(files::read_file(readme), before + text + after);
   }
   EXPECT_THROW(files::replace_figures(readme, "validation", text), std::runtime_error);
-  std::filesystem::remove(readme);
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"

@@ -19,7 +19,7 @@ TEST(Board, ComputesTheShiftBitForBitLikeTheHost) {
 }
 
 TEST(Board, TraceIsTheHostsTrace) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string host = (folder.path() / "h.csv").string(), board = (folder.path() / "b.csv").string();
   ASSERT_EQ(run_tool("replay " + shift + " --initial-soc 0.9 --initial-soc-sigma 0.1 --trace " + host).exit_code, 0);
   ASSERT_EQ(
@@ -41,7 +41,7 @@ TEST(Board, ComputesARealRecordingBitForBitLikeTheHost) {
 }
 
 TEST(Board, ComputesAnIdentifiedCellBitForBitLikeTheHost) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string cell = (folder.path() / "identified.toml").string();
   ASSERT_EQ(run_tool("identify --recording " + shift + " --out " + cell).exit_code, 0);
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
@@ -50,7 +50,7 @@ TEST(Board, ComputesAnIdentifiedCellBitForBitLikeTheHost) {
 }
 
 /// table9 followed by these tables.
-std::filesystem::path extended_cell(const images::TemporaryFolder& folder, const std::string& name,
+std::filesystem::path extended_cell(const files::TemporaryFolder& folder, const std::string& name,
                                     const std::string& tables) {
   const auto path = folder.path() / (name + ".toml");
   std::ofstream(path) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "\"table9\"",
@@ -74,7 +74,7 @@ offset_a = 0.02
 )";
 
 TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string cell = extended_cell(folder, "extended", four_mechanisms).string(),
                     trace = (folder.path() / "t.csv").string();
   const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
@@ -91,7 +91,7 @@ TEST(Board, ComputesAnExtendedCellBitForBitLikeTheHostAndShowsItsStates) {
 }
 
 TEST(Board, EstimatesPersistentErrorsBitForBitLikeTheHost) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   for (const char* cell : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
     const ToolRun run = run_tool("replay " + shift + on_board + " --cell " + cell);
     EXPECT_EQ(run.exit_code, 0) << run.err;
@@ -110,7 +110,7 @@ TEST(Board, EstimatesPersistentErrorsBitForBitLikeTheHost) {
 
 /// Every mechanism that a board runs, in another order than that of the catalogue.
 TEST(Board, ComputesEveryMechanismBitForBitLikeTheHost) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string cell = extended_cell(folder, "everything", four_mechanisms + R"(
 [instrument.voltage_gain]
 gain_error = 0.002
@@ -161,7 +161,7 @@ at_95_v_per_k = 1e-4
 }
 
 TEST(Board, TheGeneratorRefusesMechanismsWithoutFixedPointSupport) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto cell = extended_cell(folder, "transfer", "\n[mechanism.charge_transfer]\nr0_share = 0.3\n");
   const std::string log = (folder.path() / "log").string(), out = (folder.path() / "out.hpp").string();
   const std::string command = "\"" BMS_CELL_HEADER_TOOL "\" " + cell.string() + " " + out;
@@ -184,7 +184,7 @@ TEST(Microbit, ComputesTheShiftBitForBitLikeTheHost) {
 
 /// Missing, impossible and stuck readings, a gap, and repeated times.
 TEST(Microbit, ComputesAFaultyRecordingBitForBitLikeTheHost) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto path = folder.path() / "trouble.csv";
   std::ifstream in(shift);
   std::ofstream out(path);
@@ -224,7 +224,7 @@ TEST(Microbit, RefusesAnotherArithmetic) {
 
 /// table9 with R0 at 90 % one float step larger: 0.0135692 is 0x3c5e5128 as a float.
 TEST(Board, FindsAndNamesADifferenceOfOneUnitInTheLastPlace) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto other = folder.path() / "ulp.toml";
   ASSERT_EQ(std::nextafter(0.0135692F, 1.0F), 0.013569201F);
   ASSERT_NE(0.0135692F, 0.013569201F);
@@ -240,7 +240,7 @@ TEST(Board, FindsAndNamesADifferenceOfOneUnitInTheLastPlace) {
 }
 
 TEST(Board, TheFirmwareBuildRefusesACellThatIsOutOfRange) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto bad = folder.path() / "bad.toml";
   std::ofstream(bad) << files::replaced(content(BMS_SOURCE_DIR "/model/cells/table9.toml"), "0.0140197", "0.9");
   const std::string log = (folder.path() / "log").string();

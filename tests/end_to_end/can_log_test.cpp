@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 
 class CanLogTool : public ::testing::Test {
  protected:
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::string path(const char* name) const { return (folder_.path() / name).string(); }
 
   /// The frames of the emulated board for the beginning of the shift, over a wire that loses frames.

@@ -56,7 +56,7 @@ class DiagnoseTool : public ::testing::Test {
     for (int k = 0; k < rows; ++k) out << step_s * k << "," << current_a(k) << "," << voltage_v(k) << "\n";
     return path(name);
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 constexpr const char* hysteresis = "ocv_hysteresis:half_gap_v=0.015,decay=40";

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/temporary_folder.hpp"
 #include "images/child_process.hpp"
 #include "images/firmware_image.hpp"
 #include "images/flash_plan.hpp"
@@ -128,7 +129,7 @@ TEST(Flash, WritesPartsThatMayShareASectorAtOnce) {
 
 /// The same commands without those that read memory, which the test processor does not have.
 TEST(Flash, OpenOcdAcceptsTheCommandsAndWritesNothingBetweenTheParts) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   std::string command =
       "openocd -c 'adapter driver dummy' -c 'transport select jtag' -c 'jtag newtap chip cpu -irlen 4' -c 'target "
       "create chip.cpu testee -chain-position chip.cpu' "
@@ -153,7 +154,7 @@ TEST(Flash, OpenOcdAcceptsTheCommandsAndWritesNothingBetweenTheParts) {
 /// OpenOCD knows the probe and the chip of every board, and the commands before init.
 TEST(Flash, OpenOcdKnowsEveryBoardsProbeAndChip) {
   for (const std::string& board : images::board_names()) {
-    const images::TemporaryFolder folder;
+    const files::TemporaryFolder folder;
     const images::Probe probe{images::board_setting(board, "BMS_PROBE"),
                               images::board_setting(board, "BMS_PROBE_TARGET"), "no-such-probe"};
     auto command = images::openocd_command(probe, {}, std::nullopt, "");
@@ -177,7 +178,7 @@ TEST(Flash, NamesWhatIsMissing) {
   const ToolRun no_board = run_tool("flash --board no-such-board --dry-run");
   EXPECT_EQ(no_board.exit_code, 2);
   EXPECT_THAT(no_board.err, HasSubstr("no such board"));
-  const images::TemporaryFolder empty;
+  const files::TemporaryFolder empty;
   const int status = std::system(
       ("PATH=" + empty.path().string() + " \"" BMS_TOOL "\" flash 2>" + (empty.path() / "err").string()).c_str());
   EXPECT_EQ(WEXITSTATUS(status), 2);

@@ -37,7 +37,7 @@ class Hil : public ::testing::TestWithParam<const char*> {
     return run_tool("hil --board stm32f405_forklift --json - --profile " + short_drive(folder_.path()) + " " +
                     arguments);
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(Hil, ADriveWithoutFaultsRaisesNoFaultAndPublishesTheTrueSoc) {

@@ -28,7 +28,7 @@ class IdentifyTool : public ::testing::Test {
     EXPECT_EQ(run.exit_code, 0) << run.err;
     return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(IdentifyTool, HasAllFieldsOfTheContract) {

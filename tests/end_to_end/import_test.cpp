@@ -45,7 +45,7 @@ class Import : public ::testing::TestWithParam<Sample> {};
 
 TEST_P(Import, IsReadOrRefusedWithTheReason) {
   const Sample& sample = GetParam();
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const ToolRun run = log_samples::import_sample(sample, folder.path());
   if (sample.answer == Answer::refused) {
     EXPECT_EQ(run.exit_code, 2) << run.out;
@@ -95,7 +95,7 @@ class ImportFiles : public ::testing::Test {
     std::ofstream(path(name), std::ios::binary) << text;
     return path(name);
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(ImportFiles, TheBatteryDataFormatLosesNothingOnItsWayThroughARecording) {

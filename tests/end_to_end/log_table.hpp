@@ -39,7 +39,7 @@ inline std::string answer_of(const Sample& sample, const ToolRun& run) {
 inline std::string markdown_table() {
   std::string table = "| log | `bms import` | answer |\n|---|---|---|\n";
   for (const Sample& sample : samples()) {
-    const images::TemporaryFolder folder;
+    const files::TemporaryFolder folder;
     const ToolRun run = import_sample(sample, folder.path());
     table += "| " + sample.what + " | `" + sample.file + (sample.options.empty() ? "" : " " + sample.options) + "` | " +
              answer_of(sample, run) + " |\n";

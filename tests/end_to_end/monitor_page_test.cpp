@@ -72,7 +72,7 @@ class ServedPage : public ::testing::Test {
     return text;
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::unique_ptr<images::ChildProcess> tool_;
   std::string url_;
   int port_ = 0;

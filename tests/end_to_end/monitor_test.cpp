@@ -53,7 +53,7 @@ class Monitor : public ::testing::Test {
     return json::parse(run.out, nullptr, false);
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(Monitor, WritesALogAsOneJsonObject) {
@@ -306,7 +306,7 @@ TEST_F(LiveScreen, ShowsStaleValuesInGrey) {
 TEST_F(LiveScreen, EndsWithALineWhenTheAdapterIsUnplugged) {
   // the test closes the adapter's side, and the tool reads an error
   auto gone = std::make_unique<PseudoTerminal>();
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string();
   const images::ChildProcess* child = nullptr;
   auto tool = std::make_unique<images::ChildProcess>(
@@ -331,7 +331,7 @@ long memory_kb(pid_t pid) {
 TEST(MonitorLoad, ReadsTenThousandFramesPerSecondWithoutLossInConstantMemory) {
   // 4 s of traffic with 10,000 frames per second through a pipe, as fast as the tool reads; tests/vcan/load.sh sends
   // frames in real time
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string json_file = (folder.path() / "p.json").string();
   int line[2];
   ASSERT_EQ(pipe2(line, O_CLOEXEC), 0);

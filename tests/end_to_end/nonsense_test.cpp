@@ -42,7 +42,7 @@ class Nonsense : public ::testing::Test {
         std::distance(std::filesystem::directory_iterator(folder_.path()), std::filesystem::directory_iterator{}));
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(Nonsense, MillisecondsAsSecondsAreAnErrorWithTheCause) {

@@ -159,7 +159,7 @@ std::string shape(const std::string& text) {
 
 class OwnCell : public ::testing::Test {
  protected:
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   const std::string page_path_ = BMS_SOURCE_DIR "/docs/your_own_cell.md";
 };
 

@@ -36,7 +36,7 @@ std::size_t count(const std::string& text, const std::string& what) {
 
 TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto page = folder.path() / "report.html";
   ASSERT_EQ(run_tool("replay " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --report " + page.string()).exit_code, 0);
   const std::string dom = document_of(page, folder.path());
@@ -48,7 +48,7 @@ TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
 
 TEST(ReportPage, HasNoErrorChartWithoutAReference) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto page = folder.path() / "report.html", recording = folder.path() / "r.csv";
   std::ofstream csv(recording);
   csv << "time_s,current_a,voltage_v\n";
@@ -63,7 +63,7 @@ TEST(ReportPage, HasNoErrorChartWithoutAReference) {
 
 TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   ASSERT_EQ(run_tool("study --seeds 0 --out " + (folder.path() / "study").string()).exit_code, 0);
   const std::string dom = document_of(folder.path() / "study/study.html", folder.path());
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
@@ -73,7 +73,7 @@ TEST(StudyPage, DrawsTablesAndChartsWithoutAnError) {
 }
 
 /// Page of a diagnosis: the current of the shift through a cell with a mechanism, with a later recording as hold-out.
-std::string diagnosis_dom(const std::string& with, const std::string& holdout, const images::TemporaryFolder& folder) {
+std::string diagnosis_dom(const std::string& with, const std::string& holdout, const files::TemporaryFolder& folder) {
   const std::string recording = (folder.path() / "r.csv").string(), page = (folder.path() / "report.html").string();
   EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR
                      "/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " +
@@ -90,7 +90,7 @@ std::string diagnosis_dom(const std::string& with, const std::string& holdout, c
 
 TEST(DiagnosisPage, ShowsCauseLocationSizeComparisonReasonAndResidual) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("--with ocv_hysteresis:half_gap_v=0.015,decay=40", "itself", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
   EXPECT_GE(count(dom, "<canvas"), 8U);  // voltage and error of both recordings, two per chart
@@ -104,7 +104,7 @@ TEST(DiagnosisPage, ShowsCauseLocationSizeComparisonReasonAndResidual) {
 
 TEST(DiagnosisPage, ShowsTheDetectionLimitsWithoutAMismatch) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string dom = diagnosis_dom("", "", folder);
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U);
   EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));

@@ -72,7 +72,7 @@ class ProofTool : public ::testing::Test {
     // as in the repository
     ASSERT_EQ(std::system(("gzip " + path("data/a123_26650/udds_P25_A002.csv")).c_str()), 0);
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(ProofTool, RefusesMissingRecordingsInOneLine) {
@@ -149,7 +149,7 @@ TEST(ProofRecordings, AreInTheRepository) {
 /// The second page of ./bms demo: leads and contacts that the cell file does not contain, in a real recording. What a
 /// second voltmeter found stands in recordings/nasa_18650/README.md.
 TEST(RealRecording, ContactsThatTheCellFileDoesNotContainAreNamedMeasuredAndModelled) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string recordings = BMS_SOURCE_DIR "/recordings/nasa_18650/B0025/",
                     cell = (folder.path() / "cell.toml").string(), result = (folder.path() / "r.json").string();
   ASSERT_EQ(

@@ -12,7 +12,8 @@
 #include <regex>
 #include <string>
 
-#include "images/child_process.hpp"
+#include "files/temporary_folder.hpp"
+#include "images/child_process.hpp"  // for the tests that start the tool themselves
 
 namespace bms {
 
@@ -36,7 +37,7 @@ inline const int progress_is_off = setenv("BMS_PROGRESS", "off", 0);
 
 /// arguments: as typed in a shell.
 inline ToolRun run_tool(const std::string& arguments) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string out = (folder.path() / "stdout").string(), err = (folder.path() / "stderr").string();
   const int status = std::system(("\"" BMS_TOOL "\" " + arguments + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};

@@ -25,7 +25,7 @@ class Tool : public ::testing::Test {
   }
 
  private:
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(Tool, HelpOfEveryCommandShowsAnExample) {

@@ -56,7 +56,7 @@ class Wrapper : public ::testing::Test {
     return !std::filesystem::exists(checkout_ / "ran") && !std::filesystem::exists(checkout_ / "build");
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::filesystem::path checkout_ = folder_.path(), programs_ = folder_.path() / "programs";
 };
 

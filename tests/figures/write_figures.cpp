@@ -26,6 +26,7 @@
 #include "files/cell_file.hpp"
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "host_sim/lanes.hpp"
 #include "host_sim/replay.hpp"
@@ -287,7 +288,7 @@ std::string speed() {
 /// Identification and validation by the command line, from its JSON.
 std::string identified_row(const std::vector<std::string>& from, const std::vector<std::string>& judges,
                            const std::string& more) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto real = [](const std::string& name) { return (data / "a123_26650" / (name + ".csv")).string(); };
   std::vector<std::string> command = {BMS_TOOL,
                                       "identify",
@@ -395,7 +396,7 @@ std::string floors() {
 
 /// A picture of the report of the shift, by the browser that also tests the pages.
 void draw_report(const std::filesystem::path& picture) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string page = (folder.path() / "shift.html").string();
   images::output_of({BMS_TOOL, "replay", shift, "--initial-soc", "0.98", "--quiet", "--report", page});
   images::output_of({"chromium", "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",

@@ -2,13 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 
 #include <fmt/format.h>
 
 #include "files/logs/dbc.hpp"
 #include "files/logs/frame_text.hpp"
 #include "files/recording.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "measurement/recording.hpp"
 #include "tests/files/rejected_input.hpp"
@@ -23,11 +23,8 @@ constexpr const char* voltage_signal = " SG_ U : 16|16@1+ (1,0) [0|0] \"mV\" X\n
 
 class FrameLogFiles : public ::testing::Test {
  protected:
-  FrameLogFiles() { std::filesystem::create_directories(folder_); }
-  ~FrameLogFiles() override { std::filesystem::remove_all(folder_); }
-
   std::string file(const std::string& name, const std::string& text) const {
-    const std::string path = (folder_ / name).string();
+    const std::string path = (folder_.path() / name).string();
     write_file(path, text);
     return path;
   }
@@ -53,9 +50,7 @@ class FrameLogFiles : public ::testing::Test {
   }
 
  private:
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() /
-      ("frame_log_" + std::string(::testing::UnitTest::GetInstance()->current_test_info()->name()));
+  TemporaryFolder folder_;
 };
 
 /// The length plus the words before it is a small number in 32 bits.

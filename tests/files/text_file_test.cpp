@@ -8,7 +8,7 @@
 
 #include <fstream>
 
-#include "images/child_process.hpp"
+#include "files/temporary_folder.hpp"
 #include "tests/files/rejected_input.hpp"
 
 namespace bms::files {
@@ -23,8 +23,20 @@ class TextFile : public ::testing::Test {
   std::size_t files() const {
     return static_cast<std::size_t>(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator{}));
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
+
+TEST(TemporaryFolder, IsNewAndGoesWithItsContent) {
+  fs::path gone;
+  {
+    const TemporaryFolder one, other;
+    gone = one.path();
+    EXPECT_NE(one.path(), other.path());
+    fs::create_directory(gone / "inner");
+    write_file(gone / "inner" / "file", "x");
+  }
+  EXPECT_FALSE(fs::exists(gone));
+}
 
 /// The temporary file's name must not be one that another user can prepare.
 TEST_F(TextFile, ALinkInPlaceOfTheTemporaryFileIsNotFollowed) {

@@ -14,11 +14,11 @@
 #include "can_messages.hpp"  // generated from can/greybox_bms.dbc
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"
 #include "host_sim/replay.hpp"
-#include "images/child_process.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
 #include "images/image_file.hpp"
@@ -88,7 +88,7 @@ std::string memory_of(const std::filesystem::path& monitor, std::uint32_t begin,
 BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
   const std::string& board_name = emulated.name;
   const auto image = images::firmware_image(board_name, files::read_cell("table9"), images::Image::application);
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto monitor = folder.path() / "monitor";
   SlcanBoard board(image, {},
                    {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor",

@@ -221,7 +221,7 @@ class Fault : public ::testing::TestWithParam<const char*> {};
 
 /// The image exits with the number of its check that failed (tests/firmware/fault_image.cpp).
 TEST_P(Fault, LeavesARecordForTheNextRun) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   auto command = images::emulator_command(images::emulated_boards().front(), image(images::Image::fault), {GetParam()});
   command.insert(command.end(), {"-serial", "none"});
   EXPECT_EQ(images::ChildProcess(command, folder.path() / "log").wait(), 0) << files::read_file(folder.path() / "log");

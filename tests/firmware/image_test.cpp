@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/cell_file.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
 #include "images/firmware_image.hpp"
@@ -22,7 +23,7 @@ namespace fs = std::filesystem;
 TEST(Image, HasTheSameBytesFromAnotherFolder) {
   const auto here =
       images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::application);
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const fs::path sources = folder.path() / "other sources", build = folder.path() / "other build";
   fs::create_directory(sources);
   for (const char* name : {"CMakeLists.txt", "cmake", "boards", "can", "hal", "storage", "firmware", "estimator",

@@ -50,7 +50,7 @@ class LogTool : public ::testing::Test {
     return images::firmware_image("netduinoplus2", files::read_cell("table9"), images::Image::application);
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   AdapterLine line_;
 };
 

@@ -77,7 +77,7 @@ class Resume : public ::testing::Test {
     board.send(start(t).c_str());
     return board.sample(s);
   }
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::vector<measurement::Sample> part_ = some_minutes();
 };
 

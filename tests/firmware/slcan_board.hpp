@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "files/temporary_folder.hpp"
 #include "images/child_process.hpp"
 #include "images/emulator.hpp"
 
@@ -48,7 +49,7 @@ class SlcanBoard {
   int wait() { return emulator_.wait(); }
 
  private:
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   images::ChildProcess emulator_;
   int line_ = -1;
   std::string received_;

@@ -8,6 +8,7 @@
 
 #include "estimator/cell_differences.hpp"
 #include "estimator/condition.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
 #include "images/firmware_image.hpp"
@@ -46,7 +47,7 @@ StepCost counted_in(const std::string& log) {
 
 StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& image,
                             const char* function) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string log = (folder.path() / "count").string();
   auto command = images::emulator_command(board, image, {});
   const auto more = counting(image, function, log);
@@ -60,7 +61,7 @@ StepCost count_instructions(const images::EmulatedBoard& board, const std::files
 
 StepCost count_instructions(const images::EmulatedBoard& board, const std::filesystem::path& replay_image,
                             const std::vector<measurement::Sample>& samples, std::size_t states, const char* function) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string log = (folder.path() / "count").string();
   images::run_on_board(board, replay_image, samples, std::nullopt, counting(replay_image, function, log), states);
   return counted_in(log);

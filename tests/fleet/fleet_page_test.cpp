@@ -76,7 +76,7 @@ std::size_t count(const std::string& text, const std::string& what) {
 }
 
 TEST(FleetPage, SaysWhatToVisitAndDrawsOnlyTheVisibleRows) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   write_depot(folder.path() / "depot", 40);
   const std::string depot = (folder.path() / "depot").string(), page = (folder.path() / "page.html").string(),
                     result = (folder.path() / "r.json").string();
@@ -104,7 +104,7 @@ TEST(FleetPage, SaysWhatToVisitAndDrawsOnlyTheVisibleRows) {
 }
 
 TEST(FleetPage, IsRefusedForOtherTasksAndWithoutATable) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   EXPECT_EQ(run_tool("fleet report " + folder.path().string() + " --json -").exit_code, 2);
   files::write_file(folder.path() / "depot.json", R"({"task": "replay", "arguments": [], "pages": "all"})");
   const ToolRun run = run_tool("fleet report " + folder.path().string() + " --json -");

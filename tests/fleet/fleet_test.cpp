@@ -55,7 +55,7 @@ class FleetTool : public ::testing::Test {
     return run_tool("fleet run --manifest " + path("depot.csv") + " --task replay --out " + path(out) + " " + more);
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 std::vector<std::string> lines(const std::string& text) {

@@ -32,7 +32,7 @@ class SlurmEngine : public ::testing::Test {
     return "fleet run --manifest " + path("depot.csv") + " --task replay --pages none --out " + path(out) + " ";
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(SlurmEngine, PrintsItsScriptsWithoutSlurm) {
@@ -56,7 +56,7 @@ TEST_F(SlurmEngine, PrintsItsScriptsWithoutSlurm) {
 TEST_F(SlurmEngine, SaysInOneLineThatSlurmIsMissing) {
   write_depot(1, 20);
   std::filesystem::create_directories(path("empty"));
-  const images::TemporaryFolder streams;
+  const files::TemporaryFolder streams;
   const std::string err = (streams.path() / "err").string();
   const int status =
       std::system(("PATH=" + path("empty") + " " BMS_TOOL " " + command("out") + "--engine slurm 2>" + err).c_str());

@@ -10,8 +10,8 @@
 
 #include "can_messages.hpp"
 #include "files/bad_input.hpp"
+#include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
-#include "images/child_process.hpp"
 #include "monitor/candump_line.hpp"
 
 namespace bms::host_sim {
@@ -68,7 +68,7 @@ class Truck {
     for (int k = 0; k < count; ++k) sample();
   }
   std::vector<CanLog> read() const {
-    const images::TemporaryFolder folder;
+    const files::TemporaryFolder folder;
     files::write_file(folder.path() / "truck.log", text_);
     return read_can_log((folder.path() / "truck.log").string());
   }
@@ -183,12 +183,11 @@ TEST(CanLogRuns, WithoutARunThatCanBeReplayedTheLogIsRefused) {
 
 /// A compressed table is a recording like any other.
 TEST(CanLogFile, IsOneByItsFirstLineAlsoIfItIsCompressed) {
-  const auto is_log = [](std::string_view bytes) {
-    const std::string path = (std::filesystem::temp_directory_path() / "can_log_file.gz").string();
+  const files::TemporaryFolder folder;
+  const auto is_log = [&](std::string_view bytes) {
+    const std::string path = (folder.path() / "can_log_file.gz").string();
     files::write_file(path, std::string(bytes));
-    const bool found = is_can_log(path);
-    std::filesystem::remove(path);
-    return found;
+    return is_can_log(path);
   };
   // "time_s,current_a,voltage_v\n0,1,3.3\n" and "(1.000000) can0 182#00\n" by Python's gzip
   constexpr std::string_view table(

@@ -5,9 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <cstdlib>
 #include <ctime>
-#include <filesystem>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -21,6 +19,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "files/temporary_folder.hpp"
 #include "tests/identification/more_garbow_hillstrom.hpp"
 #include "tests/identification/scipy.hpp"
 
@@ -461,16 +460,10 @@ class ComparedWithScipy : public ::testing::Test {
   void SetUp() override {
     python_ = python_with_scipy();
     if (python_.empty()) GTEST_SKIP() << "no python3 here can import scipy (Debian: python3-scipy)";
-    std::string folder = (std::filesystem::temp_directory_path() / "bms.XXXXXX").string();
-    ASSERT_NE(mkdtemp(folder.data()), nullptr);
-    folder_ = folder;
-  }
-  void TearDown() override {
-    if (!folder_.empty()) std::filesystem::remove_all(folder_);
   }
 
   std::map<std::string, double> reference(const StepResponse& data, const LeastSquares& problem) const {
-    const std::string csv = (folder_ / "step.csv").string();
+    const std::string csv = (folder_.path() / "step.csv").string();
     {
       std::ofstream out(csv);
       out.precision(17);
@@ -505,7 +498,7 @@ class ComparedWithScipy : public ::testing::Test {
 
  private:
   std::string python_;
-  std::filesystem::path folder_;
+  files::TemporaryFolder folder_;
 };
 
 TEST_F(ComparedWithScipy, TheStepResponseHasTheSameOptimumToSixDigits) {

@@ -18,7 +18,7 @@ using ::testing::Not;
 class Installed : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    folder_ = new images::TemporaryFolder;
+    folder_ = new files::TemporaryFolder;
     EXPECT_EQ(run("cmake --install " BMS_BUILD_DIR " --component tool --prefix " + path("")), 0) << output();
   }
   static void TearDownTestSuite() {
@@ -42,7 +42,7 @@ class Installed : public ::testing::Test {
     return names;
   }
 
-  static inline images::TemporaryFolder* folder_ = nullptr;
+  static inline files::TemporaryFolder* folder_ = nullptr;
 };
 
 TEST_F(Installed, ToolIsStrippedAndReplays) {

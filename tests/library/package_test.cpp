@@ -60,7 +60,7 @@ class Package : public ::testing::Test {
                       Not(HasSubstr("-std=")), Not(HasSubstr("ccache")), Not(HasSubstr(BMS_SOURCE_DIR))));
   }
 
-  images::TemporaryFolder folder_;
+  files::TemporaryFolder folder_;
   std::filesystem::path consumer_ = folder_.path() / "consumer", build_ = folder_.path() / "build";
 };
 
@@ -166,7 +166,7 @@ TEST_F(Package, FootprintIsThatOfTheReadme) {
 }
 
 TEST(CellHeader, IsThatOfTheBuildExceptForItsInclude) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string a = (folder.path() / "a.hpp").string(), b = (folder.path() / "b.hpp").string();
   ASSERT_EQ(run_tool("cell header a123_26650_extended -o " + a + " --include '\"x/single.hpp\"'").exit_code, 0);
   ASSERT_EQ(std::system((BMS_CELL_HEADER_TOOL " a123_26650_extended " + b).c_str()), 0);
@@ -176,7 +176,7 @@ TEST(CellHeader, IsThatOfTheBuildExceptForItsInclude) {
 }
 
 TEST(CellHeader, BadUsageIsOneLineAndExitCode2) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string out = " -o " + (folder.path() / "x.hpp").string();
   for (const std::string& arguments :
        {std::string("cell header table9"), "cell header no_such" + out, "cell header table9 --include x.hpp" + out,

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 /// Exit code, standard output and standard error of a shell command.
 ToolRun run_shell(const std::string& command) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string out = (folder.path() / "out").string(), err = (folder.path() / "err").string();
   const int status = std::system((command + " >" + out + " 2>" + err).c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, content(out), content(err)};
@@ -55,7 +55,7 @@ std::vector<double> column(const std::filesystem::path& csv, const std::string& 
 
 TEST(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
   constexpr int samples = 200;
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const auto part = folder.path() / "part.csv", trace = folder.path() / "trace.csv";
   write_part(part, samples);
   ASSERT_EQ(run_tool(fmt::format("replay {} --initial-soc 0.8 --initial-soc-sigma 0.05 --trace {} --quiet",

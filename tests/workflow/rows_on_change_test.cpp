@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "images/child_process.hpp"
+#include "files/temporary_folder.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace bms::workflow {
@@ -13,7 +13,7 @@ namespace {
 /// 200 s of pulses of 6 A with a row each second, then -1.5 A with a row each minute. The row with 0 A comes at the end
 /// of the last minute, in which 1.5 A flowed.
 measurement::Recording read(int minutes) {
-  const images::TemporaryFolder folder;
+  const files::TemporaryFolder folder;
   const std::string path = (folder.path() / "rows_on_change.csv").string();
   std::ofstream out(path);
   out << "time_s,current_a,voltage_v\n0,0,3.3\n";

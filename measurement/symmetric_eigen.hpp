@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-namespace bms::diagnosis {
+namespace bms::measurement {
 
 /// A = vectors diag(values) vectors', values in ascending order.
 struct SymmetricEigen {
@@ -12,4 +12,4 @@ struct SymmetricEigen {
 };
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a);
 
-}  // namespace bms::diagnosis
+}  // namespace bms::measurement

@@ -1,12 +1,12 @@
-#include "diagnosis/symmetric_eigen.hpp"
+#include "measurement/symmetric_eigen.hpp"
 
 #include <Eigen/Eigenvalues>
 
-namespace bms::diagnosis {
+namespace bms::measurement {
 
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a) {
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(a);
   return {eigen.eigenvalues(), eigen.eigenvectors()};
 }
 
-}  // namespace bms::diagnosis
+}  // namespace bms::measurement
