@@ -16,12 +16,15 @@ class EffectGain {
   double of(const MechanismSetting& setting) const;
 
  private:
-  /// -2 log posterior of a raw residual with the noise that it makes most probable.
-  double cost_of(const Columns& raw, const Eigen::VectorXd& calibration) const;
+  /// What is measured more if it were so [V]: one column.
+  Columns effect_of(const Hypothesis& changed) const;
+  /// Where the base parameters go with an effect that the control does not have, under a likelihood's noise.
+  Eigen::VectorXd followed(const LikelihoodModel& under, const Columns& effect) const;
 
   LikelihoodModel likelihood_;
   NoiseModel nominal_;
   HypothesisFit control_;
+  Columns residual_, by_base_;  ///< of the control; not white
   double cost_ = 0;  ///< of the control
 };
 

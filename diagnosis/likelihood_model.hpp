@@ -99,6 +99,8 @@ class LikelihoodModel {
   std::shared_ptr<const Linearisation> linearised_at(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// By the base parameters' unknowns: a column each.
   Columns calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
+  /// The same, not white.
+  Columns raw_calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
   /// Measured less predicted [V], one column; 0 where there is no voltage. Checks in units of their own standard
   /// deviation, as in all columns.
   Columns raw_residual(const Hypothesis& h, const Eigen::VectorXd& u) const;
@@ -142,7 +144,6 @@ class LikelihoodModel {
   /// row to row.
   template <std::size_t Lanes>
   void carry(const Hypothesis& h, const Eigen::VectorXd& u, Columns& columns) const;
-  Columns raw_calibration_derivatives(const Hypothesis& h, const Eigen::VectorXd& u) const;
   std::shared_ptr<const Linearisation> linearised(const Hypothesis& h, const Eigen::VectorXd& u) const;
   std::shared_ptr<const Linearisation> factorised(Point at, Columns columns) const;
   std::vector<Whitener> whiteners_for(const NoiseModel& noise) const;
