@@ -17,6 +17,7 @@
 #include "diagnosis/one_place.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/profile.hpp"
+#include "diagnosis/resistances.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
@@ -262,6 +263,10 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
+  if (!options.learns && (names(d.verdict) || d.verdict == Verdict::no_mismatch)) {
+    likelihood.set_noise(survivors.best.noise);
+    add_resistances(likelihood, survivors.best, d);
+  }
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
   if (options.progress) options.progress(1, "done");
   return d;

@@ -36,6 +36,21 @@ struct Regime {
   double usual = 0;  ///< share of the time that the recordings spend there
 };
 
+/// A resistance [ohm], the mean over the rows weighted by the squared current.
+struct ResistanceAt {
+  std::string name;
+  double ohm = 0, std_ohm = 0;                      ///< at the temperature of the recordings
+  double reference_ohm = 0, reference_std_ohm = 0;  ///< at that of the cell file
+};
+
+/// Resistances at the temperature of the recordings, where they are known best (resistances.hpp).
+struct CellResistances {
+  double temperature_c = 0;         ///< as read, the mean weighted by the squared current
+  double reference_c = 0;           ///< of the cell file
+  double step_s = 0;                ///< median distance of two rows: of the resistance "step_ohm"
+  std::vector<ResistanceAt> cell;   ///< of the cell with the findings
+};
+
 /// A hypothesis with the values found, and the covariance of its estimated parameters.
 struct Fitted {
   Hypothesis hypothesis;
@@ -51,6 +66,7 @@ struct Finding {
   double gain = 0;                         ///< cost without it less cost with it
   double rms_contribution_v = 0;           ///< RMS change of the voltage by it [V]
   std::string because;                     ///< why this one and not a rival
+  std::vector<ResistanceAt> resistances;   ///< its own, and what it adds to R0 and R1; empty without a temperature
 };
 
 /// A set of mechanisms that was fitted, and how well.
@@ -121,6 +137,7 @@ struct Diagnosis {
   double unexplained_rmse_v = 0, unexplained_share = 0;
   std::vector<DetectionLimit> limits;
   std::vector<ChangeEstimate> estimates;  ///< of what a technician can judge
+  std::optional<CellResistances> resistances;  ///< nothing: without a temperature, or of a cell that is not understood
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;
