@@ -37,41 +37,44 @@ struct Resistances {
   std::vector<Quantity> own;  ///< by setting
 };
 
-/// A row under current.
-struct LoadedRow {
+/// A row in which the current has changed.
+struct SteppedRow {
   std::size_t record = 0;
-  double time_s = 0, soc = 0, current_a = 0;
-  double weight = 0;
+  double time_s = 0, soc = 0;
+  double current_a = 0;  ///< the larger one of before and after
+  double weight = 0;     ///< squared step, of all together 1
 };
 
 struct Load {
-  std::vector<LoadedRow> rows;
+  std::vector<SteppedRow> rows;
   double temperature_c = 0, step_s = 0;
 };
 
-/// Nothing if no row has a current and a temperature.
+/// Nothing if the current never changes or no temperature was recorded.
 std::optional<Load> load_of(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   Load load;
-  double total = 0;
+  double squared_steps = 0, squared_currents = 0;
   std::vector<double> steps_s;
   for (std::size_t n = 0; n < likelihood.records().size(); ++n) {
     const PreparedRecording& r = likelihood.records()[n];
     if (r.temperature_c.empty()) continue;
     std::vector<double> soc;
     likelihood.voltage(fit.hypothesis, fit.calibration, n, &soc);
-    for (std::size_t k = 0; k < r.size(); ++k) {
-      const double current_a = r.current_a[k];
-      if (k > 0) steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
-      const double weight = current_a * current_a;
-      if (!(weight > 0) || !std::isfinite(r.temperature_c[k]) || !std::isfinite(soc[k])) continue;
-      load.rows.push_back({n, r.time_s[k], soc[k], current_a, weight});
-      load.temperature_c += weight * r.temperature_c[k];
-      total += weight;
+    for (std::size_t k = 1; k < r.size(); ++k) {
+      const double before_a = r.current_a[k - 1], after_a = r.current_a[k], step_a = after_a - before_a;
+      steps_s.push_back(r.time_s[k] - r.time_s[k - 1]);
+      if (!std::isfinite(step_a) || !std::isfinite(r.temperature_c[k]) || !std::isfinite(soc[k])) continue;
+      load.temperature_c += after_a * after_a * r.temperature_c[k];
+      squared_currents += after_a * after_a;
+      squared_steps += step_a * step_a;
+      if (step_a != 0)
+        load.rows.push_back({n, r.time_s[k], soc[k], std::abs(after_a) > std::abs(before_a) ? after_a : before_a,
+                             step_a * step_a});
     }
   }
-  if (load.rows.empty()) return std::nullopt;
-  for (LoadedRow& row : load.rows) row.weight /= total;
-  load.temperature_c /= total;
+  if (load.rows.empty() || !(squared_currents > 0)) return std::nullopt;
+  for (SteppedRow& row : load.rows) row.weight /= squared_steps;
+  load.temperature_c /= squared_currents;
   load.step_s = measurement::upper_median(steps_s);
   return load;
 }
@@ -122,6 +125,8 @@ class ResistanceMeans {
     return sum;
   }
 
+  bool follow_temperature() const { return laws_without(no_mechanism, 0, 0).resistances_follow_temperature(); }
+
  private:
   Eigen::Index base() const { return fit_.calibration.size(); }
 
@@ -130,7 +135,7 @@ class ResistanceMeans {
     const Jet temperature_c = reference ? Jet(likelihood_.cell().reference_temperature_c)
                                         : laws.true_temperature(Jet(load_.temperature_c));
     std::uint8_t interval = 0;
-    for (const LoadedRow& row : load_.rows) {
+    for (const SteppedRow& row : load_.rows) {
       const RowResistances r = resistances_in(row, laws, temperature_c, interval);
       const auto add = [&](const Jet& x, Quantity& to) { add_row(row, x, first, count, to); };
       add(r.r0, sum.r0);
@@ -159,7 +164,7 @@ class ResistanceMeans {
     return laws;
   }
 
-  RowResistances resistances_in(const LoadedRow& row, model::ChosenLaws<Jet>& laws, const Jet& temperature_c,
+  RowResistances resistances_in(const SteppedRow& row, model::ChosenLaws<Jet>& laws, const Jet& temperature_c,
                                 std::uint8_t& interval) const {
     const Jet soc(row.soc);
     model::TablePoint<Jet> at = model::look_up_dual(tables_, soc, interval);
@@ -180,7 +185,7 @@ class ResistanceMeans {
     return r;
   }
 
-  void add_row(const LoadedRow& row, const Jet& x, std::size_t first, std::size_t count, Quantity& to) const {
+  void add_row(const SteppedRow& row, const Jet& x, std::size_t first, std::size_t count, Quantity& to) const {
     for (std::size_t lane = 0; lane < count; ++lane) {
       const std::size_t j = first + lane;
       const double by = row.weight * x.v[Lever::count + lane];
@@ -259,9 +264,11 @@ void add_resistances(const LikelihoodModel& likelihood, const HypothesisFit& fit
   if (!load || !fit.covariance.allFinite()) return;
   const ResistanceMeans means(likelihood, fit, *load);
   const JointUncertainty uncertainty(likelihood, fit);
+  const bool follow = means.follow_temperature();
   const auto stated = [&](std::string name, const Quantity& here, const Quantity& reference) {
-    return ResistanceAt{std::move(name), here.ohm, uncertainty.std_ohm(here), reference.ohm,
-                        uncertainty.std_ohm(reference)};
+    ResistanceAt r{std::move(name), {here.ohm, uncertainty.std_ohm(here)}, {}};
+    if (follow) r.reference = {reference.ohm, uncertainty.std_ohm(reference)};
+    return r;
   };
   const Resistances here = means.at(false), reference = means.at(true);
   d.resistances = CellResistances{load->temperature_c,

@@ -12,8 +12,8 @@
 namespace bms::diagnosis {
 
 /// Adds the resistances of the cell and of its findings, if the recordings have a temperature. The likelihood has the
-/// noise model of the fit. Without what heats the inside of the cell, with closed contacts, and with a contact that has
-/// changed. Names of ResistanceAt:
+/// noise model of the fit. A loose contact is closed, one that has changed stays so, and the current does not heat the
+/// cell. Names of ResistanceAt:
 ///   r0_ohm, r1_ohm              of the cell
 ///   step_ohm                    of the cell, from one row to the next after a step of the current
 ///   resistance_ohm              a finding's own

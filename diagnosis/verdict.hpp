@@ -36,11 +36,16 @@ struct Regime {
   double usual = 0;  ///< share of the time that the recordings spend there
 };
 
-/// A resistance [ohm], the mean over the rows weighted by the squared current.
+/// A resistance with its standard deviation.
+struct UncertainOhm {
+  double ohm = 0, std_ohm = 0;
+};
+
+/// A resistance at two temperatures, the mean over the steps of the current weighted by their squares.
 struct ResistanceAt {
   std::string name;
-  double ohm = 0, std_ohm = 0;                      ///< at the temperature of the recordings
-  double reference_ohm = 0, reference_std_ohm = 0;  ///< at that of the cell file
+  UncertainOhm here;                      ///< at the temperature of the recordings
+  std::optional<UncertainOhm> reference;  ///< at that of the cell file; nothing: no law says how it follows
 };
 
 /// Resistances at the temperature of the recordings, where they are known best (resistances.hpp).

@@ -137,6 +137,7 @@ json mechanisms(const workflow::DiagnoseResult& r) {
                     {"probability", rounded(f.probability, 3)},
                     {"rms_mv", rounded(1e3 * f.rms_contribution_v, 3)},
                     {"rivals", std::move(rivals)},
+                    {"at_temperature", at_temperature_text(r.diagnosis, f.resistances)},
                     {"parameters", std::move(parameters)}});
   }
   return list;

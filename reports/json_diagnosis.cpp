@@ -35,10 +35,10 @@ Json resistances_of(const std::vector<diagnosis::ResistanceAt>& resistances) {
   Json list = Json::array();
   for (const diagnosis::ResistanceAt& r : resistances)
     list.push_back({{"name", r.name},
-                    {"value", number(r.ohm)},
-                    {"std", number(r.std_ohm)},
-                    {"reference_value", number(r.reference_ohm)},
-                    {"reference_std", number(r.reference_std_ohm)},
+                    {"value", number(r.here.ohm)},
+                    {"std", number(r.here.std_ohm)},
+                    {"reference_value", r.reference ? number(r.reference->ohm) : Json(nullptr)},
+                    {"reference_std", r.reference ? number(r.reference->std_ohm) : Json(nullptr)},
                     {"unit", "ohm"}});
   return list;
 }
