@@ -17,7 +17,7 @@ namespace bms::diagnosis {
 namespace {
 
 /// Parameters whose derivatives go through the laws at once, next to those by the levers.
-constexpr std::size_t lanes = 16;
+enum : std::size_t { lanes = 16 };
 using Jet = arithmetic::DualNumber<Lever::count + lanes>;
 
 /// A resistance and its derivatives.
@@ -68,8 +68,8 @@ std::optional<Load> load_of(const LikelihoodModel& likelihood, const HypothesisF
       squared_currents += after_a * after_a;
       squared_steps += step_a * step_a;
       if (step_a != 0)
-        load.rows.push_back({n, r.time_s[k], soc[k], std::abs(after_a) > std::abs(before_a) ? after_a : before_a,
-                             step_a * step_a});
+        load.rows.push_back(
+            {n, r.time_s[k], soc[k], std::abs(after_a) > std::abs(before_a) ? after_a : before_a, step_a * step_a});
     }
   }
   if (load.rows.empty() || !(squared_currents > 0)) return std::nullopt;
@@ -132,8 +132,8 @@ class ResistanceMeans {
 
   void add_batch(bool reference, std::size_t without, std::size_t first, std::size_t count, Resistances& sum) const {
     model::ChosenLaws<Jet> laws = laws_without(without, first, count);
-    const Jet temperature_c = reference ? Jet(likelihood_.cell().reference_temperature_c)
-                                        : laws.true_temperature(Jet(load_.temperature_c));
+    const Jet temperature_c =
+        reference ? Jet(likelihood_.cell().reference_temperature_c) : laws.true_temperature(Jet(load_.temperature_c));
     std::uint8_t interval = 0;
     for (const SteppedRow& row : load_.rows) {
       const RowResistances r = resistances_in(row, laws, temperature_c, interval);
@@ -178,9 +178,8 @@ class ResistanceMeans {
                      at.r0_ohm + model::OneRc<Jet>::discretise(at, input.duration_s).alpha * at.r1_ohm,
                      std::vector<Jet>(fit_.hypothesis.settings.size())};
     for (std::size_t k = 0; k < r.own.size(); ++k) {
-      model::visit_mechanism(fit_.hypothesis.settings[k].index, [&]<class M>(std::type_identity<M>) {
-        add_own<M>(laws, at, input, r.own[k], r.step);
-      });
+      model::visit_mechanism(fit_.hypothesis.settings[k].index,
+                             [&]<class M>(std::type_identity<M>) { add_own<M>(laws, at, input, r.own[k], r.step); });
     }
     return r;
   }
@@ -282,8 +281,7 @@ void add_resistances(const LikelihoodModel& likelihood, const HypothesisFit& fit
     };
     const Resistances less = means.at(false, f.setting.index), reference_less = means.at(true, f.setting.index);
     for (std::size_t k = 0; k < here.own.size(); ++k) {
-      if (fit.hypothesis.settings[k].index == f.setting.index)
-        state("resistance_ohm", here.own[k], reference.own[k]);
+      if (fit.hypothesis.settings[k].index == f.setting.index) state("resistance_ohm", here.own[k], reference.own[k]);
     }
     state("added_r0_ohm", here.r0 - less.r0, reference.r0 - reference_less.r0);
     state("added_r1_ohm", here.r1 - less.r1, reference.r1 - reference_less.r1);

@@ -50,10 +50,10 @@ struct ResistanceAt {
 
 /// Resistances at the temperature of the recordings, where they are known best (resistances.hpp).
 struct CellResistances {
-  double temperature_c = 0;         ///< as read, the mean weighted by the squared current
-  double reference_c = 0;           ///< of the cell file
-  double step_s = 0;                ///< median distance of two rows: of the resistance "step_ohm"
-  std::vector<ResistanceAt> cell;   ///< of the cell with the findings
+  double temperature_c = 0;        ///< as read, the mean weighted by the squared current
+  double reference_c = 0;          ///< of the cell file
+  double step_s = 0;               ///< median distance of two rows: of the resistance "step_ohm"
+  std::vector<ResistanceAt> cell;  ///< of the cell with the findings
 };
 
 /// A hypothesis with the values found, and the covariance of its estimated parameters.
@@ -141,7 +141,7 @@ struct Diagnosis {
   double noise_floor_v = 0;
   double unexplained_rmse_v = 0, unexplained_share = 0;
   std::vector<DetectionLimit> limits;
-  std::vector<ChangeEstimate> estimates;  ///< of what a technician can judge
+  std::vector<ChangeEstimate> estimates;       ///< of what a technician can judge
   std::optional<CellResistances> resistances;  ///< nothing: without a temperature, or of a cell that is not understood
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;

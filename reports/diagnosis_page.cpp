@@ -224,7 +224,6 @@ json charts(const workflow::DiagnoseResult& r) {
 }
 
 // ---- errors over an axis: SOC, current, temperature, time since a current step
-
 struct Axis {
   const char *id, *title, *unit;
   bool logarithmic;
