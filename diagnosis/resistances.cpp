@@ -17,8 +17,9 @@ namespace bms::diagnosis {
 namespace {
 
 /// Parameters whose derivatives go through the laws at once, next to those by the levers.
-enum : std::size_t { lanes = 16 };
-using Jet = arithmetic::DualNumber<Lever::count + lanes>;
+enum : std::size_t { at_once = 16 };
+constexpr std::size_t lanes = at_once, levers = Lever::count;
+using Jet = arithmetic::DualNumber<levers + lanes>;
 
 /// A resistance and its derivatives.
 struct Quantity {
@@ -154,7 +155,7 @@ class ResistanceMeans {
     for (std::size_t lane = 0; lane < count; ++lane) {
       const std::size_t j = first + lane;
       const ParameterRef ref = j < found_.size() ? found_[j] : own_[j - found_.size()].ref;
-      values[ref.setting][ref.parameter].v.set(Lever::count + lane, 1);
+      values[ref.setting][ref.parameter].v.set(levers + lane, 1);
     }
     model::ChosenLaws<Jet> laws;
     for (std::size_t k = 0; k < values.size(); ++k) {
@@ -187,7 +188,7 @@ class ResistanceMeans {
   void add_row(const SteppedRow& row, const Jet& x, std::size_t first, std::size_t count, Quantity& to) const {
     for (std::size_t lane = 0; lane < count; ++lane) {
       const std::size_t j = first + lane;
-      const double by = row.weight * x.v[Lever::count + lane];
+      const double by = row.weight * x.v[levers + lane];
       if (j < found_.size())
         to.by_found[static_cast<Eigen::Index>(j)] += by;
       else
