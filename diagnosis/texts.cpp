@@ -267,10 +267,12 @@ std::vector<std::string> at_temperature_text(const Diagnosis& d, const std::vect
         r.reference->std_ohm < text_style.better_times * r.here.std_ohm)
       continue;
     const auto word = std::find_if(words.begin(), words.end(), [&](const auto& w) { return w.first == r.name; });
-    parts.push_back(fmt::format("at {:.3g} degrees C {} is {}, at {:.3g} degrees C {}", d.resistances->temperature_c,
+    parts.push_back(fmt::format("at {:.3g} degrees C {} is {}", d.resistances->temperature_c,
                                 word == words.end() ? r.name : word->second,
-                                quantity(r.here.ohm, r.here.std_ohm, "ohm"), d.resistances->reference_c,
-                                quantity(r.reference->ohm, r.reference->std_ohm, "ohm")));
+                                quantity(r.here.ohm, r.here.std_ohm, "ohm")));
+    if (r.reference->ohm != 0)
+      parts.back() += fmt::format(", at {:.3g} degrees C {}", d.resistances->reference_c,
+                                  quantity(r.reference->ohm, r.reference->std_ohm, "ohm"));
   }
   return parts;
 }
