@@ -14,26 +14,6 @@ namespace bms::diagnosis {
 
 namespace {
 
-/// Derivatives by the parameters of the cell file's own mechanisms, in their standard deviations. A fit leaves these as
-/// they are, so that their error goes into what it finds.
-Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
-  std::vector<ParameterRef> refs;
-  std::vector<double> sigmas;
-  for (std::size_t s = 0; s < fit.hypothesis.own; ++s) {
-    const MechanismSetting& setting = fit.hypothesis.settings[s];
-    const model::MechanismInfo& info = model::catalogue[setting.index];
-    for (std::size_t p = 0; p < info.parameters; ++p) {
-      if (info.parameter[p].role == model::Role::given || !(setting.deviation[p] > 0)) continue;
-      refs.push_back({s, p});
-      sigmas.push_back(setting.deviation[p]);
-    }
-  }
-  if (refs.empty()) return Columns(static_cast<Eigen::Index>(likelihood.samples()), 0);
-  Columns columns = likelihood.derivatives(fit.hypothesis, fit.calibration, refs);
-  for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) *= sigmas[static_cast<std::size_t>(j)];
-  return columns;
-}
-
 /// 1 / variance of what is known of each estimated parameter before any voltage is looked at; 0: nothing.
 Eigen::VectorXd prior_precision(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const FitParameters parameters(likelihood.cell(), fit.hypothesis);
@@ -78,6 +58,29 @@ Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::Vecto
 }
 
 }  // namespace
+
+std::vector<FileParameter> own_parameters(const Hypothesis& h) {
+  std::vector<FileParameter> own;
+  for (std::size_t s = 0; s < h.own; ++s) {
+    const MechanismSetting& setting = h.settings[s];
+    const model::MechanismInfo& info = model::catalogue[setting.index];
+    for (std::size_t p = 0; p < info.parameters; ++p) {
+      if (info.parameter[p].role == model::Role::given || !(setting.deviation[p] > 0)) continue;
+      own.push_back({{s, p}, setting.deviation[p]});
+    }
+  }
+  return own;
+}
+
+Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
+  const std::vector<FileParameter> own = own_parameters(fit.hypothesis);
+  if (own.empty()) return Columns(static_cast<Eigen::Index>(likelihood.samples()), 0);
+  std::vector<ParameterRef> refs;
+  for (const FileParameter& o : own) refs.push_back(o.ref);
+  Columns columns = likelihood.derivatives(fit.hypothesis, fit.calibration, refs);
+  for (Eigen::Index j = 0; j < columns.cols(); ++j) columns.col(j) *= own[static_cast<std::size_t>(j)].sigma;
+  return columns;
+}
 
 Eigen::MatrixXd block_covariance(const LikelihoodModel& likelihood, const HypothesisFit& fit) {
   const Columns base = likelihood.calibration_derivatives(fit.hypothesis, fit.calibration);

@@ -5,6 +5,8 @@
 // H. White, Econometrica 48 (1980) 817; K.-Y. Liang, S. Zeger, Biometrika 73 (1986) 13.
 #pragma once
 
+#include <vector>
+
 #include <Eigen/Core>
 
 #include "diagnosis/likelihood_model.hpp"
@@ -23,6 +25,16 @@ void for_each_block(std::size_t size, Block&& block) {
     block(first, rows * (b + 1) / covariance_blocks - first);
   }
 }
+
+/// A parameter that a fit leaves as it is, and its standard deviation.
+struct FileParameter {
+  ParameterRef ref;
+  double sigma = 0;
+};
+/// The parameters of the cell file's own mechanisms that have a standard deviation.
+std::vector<FileParameter> own_parameters(const Hypothesis& h);
+/// Derivatives by own_parameters(), in their standard deviations; whitened. Their error goes into what a fit finds.
+Columns by_own_mechanisms(const LikelihoodModel& likelihood, const HypothesisFit& fit);
 
 /// Covariance of the estimated parameters of a fit, the base parameters marginalised. What the data say is in each
 /// direction as uncertain as the pulls of equal blocks of time in each recording are, but not less than by the

@@ -17,6 +17,7 @@
 #include "diagnosis/one_place.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/profile.hpp"
+#include "diagnosis/resistances.hpp"
 #include "diagnosis/screen.hpp"
 #include "diagnosis/selection.hpp"
 #include "diagnosis/testability.hpp"
@@ -205,6 +206,12 @@ void add_extended_cell(const LikelihoodModel& likelihood, const HypothesisFit& b
         d.cell, {best.calibration.data(), best.calibration.data() + best.calibration.size()});
 }
 
+void add_resistances_if_understood(LikelihoodModel& likelihood, const HypothesisFit& best, Diagnosis& d) {
+  if (!names(d.verdict) && d.verdict != Verdict::no_mismatch) return;
+  likelihood.set_noise(best.noise);
+  add_resistances(likelihood, best, d);
+}
+
 /// The diagnosis of recordings that can be used. d: with the cell, and what the checks have found.
 Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& own,
                             std::vector<PreparedRecording> records, const Options& options) {
@@ -259,6 +266,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
+  if (!options.learns) add_resistances_if_understood(likelihood, survivors.best, d);
   d.estimates = estimates_of(likelihood, search.nominal_noise(), survivors.best, scope);
   if (options.progress) options.progress(1, "done");
   return d;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -246,6 +248,33 @@ std::string because(const Diagnosis& d, const Finding& f, const RecordingFacts& 
       "the other {}.",
       compared(instead), best - rival->gain, thresholds.decision.tie, percent(explained),
       percent(rival->explained_share));
+}
+
+std::vector<std::string> at_temperature_text(const Diagnosis& d, const std::vector<ResistanceAt>& resistances) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 6> words = {{
+      {"r0_ohm", "R0 of the cell"},
+      {"r1_ohm", "R1 of the cell"},
+      {"step_ohm", "the resistance one row after a step of the current"},
+      {"resistance_ohm", "its resistance"},
+      {"added_r0_ohm", "what it adds to R0"},
+      {"added_r1_ohm", "what it adds to R1"},
+  }};
+  std::vector<std::string> parts;
+  for (const ResistanceAt& r : resistances) {
+    if (!d.resistances || !r.reference) continue;
+    const double apart_ohm = std::abs(r.here.ohm - r.reference->ohm);
+    if (apart_ohm <= r.here.std_ohm && apart_ohm <= text_style.differs_share * std::abs(r.reference->ohm) &&
+        r.reference->std_ohm < text_style.better_times * r.here.std_ohm)
+      continue;
+    const auto word = std::find_if(words.begin(), words.end(), [&](const auto& w) { return w.first == r.name; });
+    parts.push_back(fmt::format("at {:.3g} degrees C {} is {}", d.resistances->temperature_c,
+                                word == words.end() ? r.name : word->second,
+                                quantity(r.here.ohm, r.here.std_ohm, "ohm")));
+    if (r.reference->ohm != 0)
+      parts.back() += fmt::format(", at {:.3g} degrees C {}", d.resistances->reference_c,
+                                  quantity(r.reference->ohm, r.reference->std_ohm, "ohm"));
+  }
+  return parts;
 }
 
 void describe(Diagnosis& d, const model::CellParameters<>& cell, const std::vector<PreparedRecording>& records) {

@@ -24,6 +24,10 @@ std::string statement(const Diagnosis& diagnosis, const RecordingFacts& facts);
 /// Why this finding and not its best rival: the fact that distinguishes them, and by how much the rival fits worse.
 std::string because(const Diagnosis& diagnosis, const Finding& finding, const RecordingFacts& facts);
 
+/// Resistances at the temperature of the recordings, each a phrase: "at -5 degrees C its resistance is 21.3 ± 0.2 mOhm,
+/// at 25 degrees C 7 ± 2 mOhm". Only those that are larger, smaller or better known there.
+std::vector<std::string> at_temperature_text(const Diagnosis& diagnosis, const std::vector<ResistanceAt>& resistances);
+
 /// Fills in what the diagnosis leaves empty of statement and Finding::because.
 void describe(Diagnosis& diagnosis, const model::CellParameters<>& cell, const std::vector<PreparedRecording>& records);
 
@@ -34,6 +38,8 @@ struct TextStyle {
   std::size_t causes_in_full = 2;       ///< the others by name: a sentence must end
   double explained_by_tables = 0.1;     ///< share below which the tables of the cell file contain what was found
   double nearest_explains = 0.2;        ///< share from which the nearest mechanism of an unknown cause is named
+  double differs_share = 0.1;           ///< share by which a resistance differs from that at another temperature
+  double better_times = 2;              ///< ratio of standard deviations from which a resistance is known better
   double rest_named_s = 60;             ///< shorter rests do not count
 };
 inline constexpr TextStyle text_style{};

@@ -36,6 +36,26 @@ struct Regime {
   double usual = 0;  ///< share of the time that the recordings spend there
 };
 
+/// A resistance with its standard deviation.
+struct UncertainOhm {
+  double ohm = 0, std_ohm = 0;
+};
+
+/// A resistance at two temperatures, the mean over the steps of the current weighted by their squares.
+struct ResistanceAt {
+  std::string name;
+  UncertainOhm here;                      ///< at the temperature of the recordings
+  std::optional<UncertainOhm> reference;  ///< at that of the cell file; nothing: no law says how it follows
+};
+
+/// Resistances at the temperature of the recordings, where they are known best (resistances.hpp).
+struct CellResistances {
+  double temperature_c = 0;        ///< as read, the mean weighted by the squared current
+  double reference_c = 0;          ///< of the cell file
+  double step_s = 0;               ///< median distance of two rows: of the resistance "step_ohm"
+  std::vector<ResistanceAt> cell;  ///< of the cell with the findings
+};
+
 /// A hypothesis with the values found, and the covariance of its estimated parameters.
 struct Fitted {
   Hypothesis hypothesis;
@@ -51,6 +71,7 @@ struct Finding {
   double gain = 0;                         ///< cost without it less cost with it
   double rms_contribution_v = 0;           ///< RMS change of the voltage by it [V]
   std::string because;                     ///< why this one and not a rival
+  std::vector<ResistanceAt> resistances;   ///< its own, and what it adds to R0 and R1; empty without a temperature
 };
 
 /// A set of mechanisms that was fitted, and how well.
@@ -120,7 +141,8 @@ struct Diagnosis {
   double noise_floor_v = 0;
   double unexplained_rmse_v = 0, unexplained_share = 0;
   std::vector<DetectionLimit> limits;
-  std::vector<ChangeEstimate> estimates;  ///< of what a technician can judge
+  std::vector<ChangeEstimate> estimates;       ///< of what a technician can judge
+  std::optional<CellResistances> resistances;  ///< nothing: without a temperature, or of a cell that is not understood
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;
   std::vector<std::string> warnings;

@@ -137,6 +137,7 @@ json mechanisms(const workflow::DiagnoseResult& r) {
                     {"probability", rounded(f.probability, 3)},
                     {"rms_mv", rounded(1e3 * f.rms_contribution_v, 3)},
                     {"rivals", std::move(rivals)},
+                    {"at_temperature", at_temperature_text(r.diagnosis, f.resistances)},
                     {"parameters", std::move(parameters)}});
   }
   return list;
@@ -223,7 +224,6 @@ json charts(const workflow::DiagnoseResult& r) {
 }
 
 // ---- errors over an axis: SOC, current, temperature, time since a current step
-
 struct Axis {
   const char *id, *title, *unit;
   bool logarithmic;

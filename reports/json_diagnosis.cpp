@@ -31,6 +31,18 @@ Json parameters_of(const diagnosis::MechanismSetting& setting) {
   return parameters;
 }
 
+Json resistances_of(const std::vector<diagnosis::ResistanceAt>& resistances) {
+  Json list = Json::array();
+  for (const diagnosis::ResistanceAt& r : resistances)
+    list.push_back({{"name", r.name},
+                    {"value", number(r.here.ohm)},
+                    {"std", number(r.here.std_ohm)},
+                    {"reference_value", r.reference ? number(r.reference->ohm) : Json(nullptr)},
+                    {"reference_std", r.reference ? number(r.reference->std_ohm) : Json(nullptr)},
+                    {"unit", "ohm"}});
+  return list;
+}
+
 Json mechanism_of(const diagnosis::Finding& f) {
   const diagnosis::MechanismText& text = diagnosis::text_of_mechanism(f.setting.index);
   Json parameters = parameters_of(f.setting);
@@ -41,6 +53,7 @@ Json mechanism_of(const diagnosis::Finding& f) {
           {"probability", number(f.probability)},
           {"equivalent_to", ids_of(f.equivalent_to)},
           {"parameters", std::move(parameters)},
+          {"resistances", resistances_of(f.resistances)},
           {"rms_contribution_v", number(f.rms_contribution_v)},
           {"gain", number(f.gain)},
           {"because", f.because},
@@ -212,6 +225,11 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                            : Json(nullptr);
   json["detection_limits"] = limits_of(d);
   json["estimates"] = estimates_of(d);
+  json["resistances"] = d.resistances ? Json{{"temperature_c", number(d.resistances->temperature_c)},
+                                             {"reference_c", number(d.resistances->reference_c)},
+                                             {"step_s", number(d.resistances->step_s)},
+                                             {"cell", resistances_of(d.resistances->cell)}}
+                                      : Json(nullptr);
   json["not_testable"] = Json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});

@@ -32,7 +32,7 @@ std::string progress_line(double done, double left_s, const std::string& what) {
 }
 
 /// A finding with its parameters, one line each.
-std::string finding_text(const diagnosis::Finding& f) {
+std::string finding_text(const diagnosis::Diagnosis& d, const diagnosis::Finding& f) {
   const model::MechanismInfo& info = model::catalogue[f.setting.index];
   std::string text;
   for (std::size_t k = 0; k < info.parameters; ++k) {
@@ -41,6 +41,7 @@ std::string finding_text(const diagnosis::Finding& f) {
                     f.setting.deviation[k] > 0 ? fmt::format(" +- {:.2g}", f.setting.deviation[k]) : "",
                     info.parameter[k].unit == "1" ? "" : info.parameter[k].unit);
   }
+  for (const std::string& at : at_temperature_text(d, f.resistances)) text += fmt::format("  {:24} {}\n", "", at);
   if (!f.because.empty()) text += "  " + f.because + "\n";
   return text;
 }
@@ -67,7 +68,11 @@ std::string comparison_text(const workflow::DiagnoseResult& r) {
 std::string summary(const workflow::DiagnoseResult& r) {
   std::string text = fmt::format("{}: {}\n", name_of(r.diagnosis.verdict), r.diagnosis.statement);
   if (r.named()) {
-    for (const diagnosis::Finding& f : r.diagnosis.findings) text += finding_text(f);
+    for (const diagnosis::Finding& f : r.diagnosis.findings) text += finding_text(r.diagnosis, f);
+  }
+  if (r.diagnosis.resistances) {
+    for (const std::string& at : at_temperature_text(r.diagnosis, r.diagnosis.resistances->cell))
+      text += diagnosis::capitalised(at) + ".\n";
   }
   if (r.next) {
     text += fmt::format("{}\n  {}\n  {}\n", diagnosis::why(*r.next), diagnosis::instruction(*r.next),

@@ -94,6 +94,7 @@
     share.hint = 'RMS on these recordings; the whole bar is the error of ' + mv(report.error_mv);
     const shown = m.parameters.filter(p => !(p.given && m.parameters.length > 2) && (!many || p.strength));
     bars(make(box, 'div'), [share, ...shown.map(parameter_row)], {left: 92, right: 122, each: many ? 18 : 21});
+    for (const at of m.at_temperature) make(box, 'p', title_of(at) + '.', 'why');
   };
   const draw_size = () => {
     const box = get('much'), title = get('much-title');
