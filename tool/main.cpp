@@ -2,6 +2,9 @@
 //
 //   0 done; 1 done, and the answer is no; 2 bad usage or bad input; 3 a fault of the program
 #include <fcntl.h>
+#ifdef __GLIBC__
+#include <malloc.h>
+#endif
 #include <unistd.h>
 
 #include <algorithm>
@@ -32,6 +35,16 @@ std::vector<std::unique_ptr<Command>> all_commands() {
                           hil_command, flash_command, monitor_command, log_command, service_command})
     commands.push_back(make());
   return commands;
+}
+
+/// Large matrices come and go by the thousand: their memory stays with the program instead of being returned, cleared
+/// and mapped again each time.
+void keep_memory() {
+#ifdef __GLIBC__
+  constexpr int largest_kept = 32 << 20;  // that glibc accepts [bytes]
+  mallopt(M_MMAP_THRESHOLD, largest_kept);
+  mallopt(M_TRIM_THRESHOLD, 16 * largest_kept);
+#endif
 }
 
 /// Prints the help, or a usage error on one line. Returns the exit code.
@@ -121,6 +134,7 @@ int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entrie
 }  // namespace
 
 int main(int argc, char** argv) {
+  keep_memory();
   prepare_standard_streams();
   const auto commands = all_commands();
   CLI::App app{"greybox-bms: a battery model inside a battery management system, and the same model over recordings"};
