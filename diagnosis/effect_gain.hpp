@@ -25,7 +25,7 @@ class EffectGain {
   NoiseModel nominal_;
   HypothesisFit control_;
   Columns residual_, by_base_;  ///< of the control; not white
-  double cost_ = 0;  ///< of the control
+  double cost_ = 0;             ///< of the control
 };
 
 }  // namespace bms::diagnosis

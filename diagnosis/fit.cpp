@@ -106,7 +106,7 @@ class GaussNewton {
   double cost_at_start_ = 0;
   std::shared_ptr<const Linearisation> around_;
   std::optional<LikelihoodModel::Point> derived_at_;
-  Columns by_theta_;         ///< there, per unit step
+  Columns by_theta_;         ///< there, per unit step; the last column is the residual
   Eigen::MatrixXd schur_;    ///< of theta, u eliminated
   Eigen::VectorXd natural_;  ///< d parameter / d step
   double damping_ = fit_numerics.damping;
@@ -135,22 +135,23 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
 void GaussNewton::derive() {
   if (derived_at_ == here()) return;
   derived_at_ = here();
-  by_theta_ = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
   for (Eigen::Index j = 0; j < m_; ++j) natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
-  by_theta_ *= natural_.asDiagonal();
+  by_theta_.resize(fit_.residual.size(), m_ + 1);
+  by_theta_.leftCols(m_) =
+      likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought()) * natural_.asDiagonal();
 }
 
 GaussNewton::NormalEquations GaussNewton::normal_equations() {
   derive();
-  const Columns& j_theta = by_theta_;
-  const Columns& j_u = around_->columns;
+  by_theta_.col(m_) = fit_.residual;
+  const Eigen::MatrixXd of_theta = squared(by_theta_), of_both = products(around_->columns, by_theta_);
   NormalEquations e;
-  e.u_gradient = j_u.transpose() * fit_.residual - fit_.calibration;
+  e.u_gradient = of_both.col(m_) - fit_.calibration;
   e.u_alone = around_->normal.solve(e.u_gradient);
   e.within_reach = e.u_gradient.dot(e.u_alone);
   if (m_ == 0) return e;
-  Eigen::VectorXd gradient = j_theta.transpose() * fit_.residual;
-  Eigen::MatrixXd normal = squared(j_theta);
+  Eigen::VectorXd gradient = of_theta.col(m_).head(m_);
+  Eigen::MatrixXd normal = of_theta.topLeftCorner(m_, m_);
   for (Eigen::Index j = 0; j < m_; ++j) {
     const PriorDistance prior = parameters_.prior_distance(j, parameters_.of(fit_.hypothesis, j));
     if (prior.sigma == 0) continue;
@@ -158,7 +159,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
     gradient[j] -= prior.away * per;
     normal(j, j) += per * per;
   }
-  const Eigen::MatrixXd cross = products(j_u, j_theta);
+  const Eigen::MatrixXd cross = of_both.leftCols(m_);
   e.solved = around_->normal.solve(cross);
   schur_ = normal - cross.transpose() * e.solved;
   e.rhs = gradient - cross.transpose() * e.u_alone;
@@ -180,6 +181,10 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
     double promised = e.u_gradient.dot(e.u_alone);
     if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
     if (attempt > 0 && promised < quiet) break;
+    // far below what they promise: the derivatives are taken again, as long as that helps
+    if (attempt >= fit_numerics.attempts_astray && result.astray && renewals_ < fit_numerics.renewals_astray &&
+        !(around_->at == here()))
+      break;
     Hypothesis trial = fit_.hypothesis;
     for (Eigen::Index j = 0; j < m_; ++j)
       parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);

@@ -99,8 +99,8 @@ std::vector<double> LikelihoodModel::costs_of_noise(const Columns& raw, std::spa
   for (const NoiseModel& noise : noises) sums.push_back(price_of_noise(noise, nominal));
   std::size_t row = 0;
   for (std::size_t r = 0; r < records_.size(); ++r) {
-    const std::vector<double> of_record = minus_two_log_likelihoods(
-        noises, records_[r].time_s, row_noise_[r], usable_[r], {raw.data() + row, records_[r].size()});
+    const std::vector<double> of_record = minus_two_log_likelihoods(noises, records_[r].time_s, row_noise_[r],
+                                                                    usable_[r], {raw.data() + row, records_[r].size()});
     for (std::size_t k = 0; k < sums.size(); ++k) sums[k] += of_record[k];
     row += records_[r].size();
   }

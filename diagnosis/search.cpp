@@ -157,7 +157,8 @@ HypothesisFit Search::fit_with(const HypothesisFit& around, const Candidate& c, 
   Hypothesis h = with(around.hypothesis, c.start);
   if (!c.bursts.empty()) h.bursts = c.bursts;
   std::vector<Start> starts = {cheapest_start(h, around, foremost)};
-  for (const MechanismSetting& form : c.other_forms) starts.push_back({with(around.hypothesis, form), around.calibration});
+  for (const MechanismSetting& form : c.other_forms)
+    starts.push_back({with(around.hypothesis, form), around.calibration});
   if (const auto joint = joint_start(h)) starts.push_back({*joint, around.calibration});
   for (const Eigen::VectorXd& u : far_bases(around)) {
     if (const auto farther = far_start(h, u)) starts.push_back({farther->hypothesis, u});
@@ -226,16 +227,21 @@ HypothesisFit Search::refined_onset(HypothesisFit best) const {
                least_s = search_numerics.onset_rows * r.duration_s() / static_cast<double>(r.size());
   for (double reach_s = r.duration_s() / search_numerics.onset_reach; reach_s > least_s; reach_s /= 2) {
     const double middle_s = onset_of(best.hypothesis);
-    for (const double step : search_numerics.onset_steps) {
-      Hypothesis h = best.hypothesis;
+    std::array<Hypothesis, search_numerics.onset_steps.size()> moved;
+    std::array<Eigen::VectorXd, search_numerics.onset_steps.size()> residuals;
+    measurement::in_parallel(moved.size(), [&](std::size_t k) {
+      moved[k] = best.hypothesis;
       // a step at either end of the recording is not a step
-      onset_of(h) = std::clamp(middle_s + step * reach_s, r.time_s.front() + margin_s, r.time_s.back() - margin_s);
-      const Eigen::VectorXd residual = likelihood_.residual(h, best.calibration);
-      const double cost = residual.squaredNorm() + (best.cost - best.residual.squaredNorm());
+      onset_of(moved[k]) = std::clamp(middle_s + search_numerics.onset_steps[k] * reach_s, r.time_s.front() + margin_s,
+                                      r.time_s.back() - margin_s);
+      residuals[k] = likelihood_.residual(moved[k], best.calibration);
+    });
+    for (std::size_t k = 0; k < moved.size(); ++k) {
+      const double cost = residuals[k].squaredNorm() + (best.cost - best.residual.squaredNorm());
       if (!(cost < best.cost)) continue;
       best.cost = cost;
-      best.residual = residual;
-      best.hypothesis = h;
+      best.residual = residuals[k];
+      best.hypothesis = moved[k];
     }
   }
   return likelihood_.fit(best.hypothesis, best.calibration, numerics.fit.onset_iterations);

@@ -57,7 +57,7 @@ void in_parallel(std::size_t count, const Work& work) {
     IdleProcessor processor;
     if (!processor) break;
     // given back as soon as nothing is left to take: what the last pieces call may use it
-    others.emplace_back([&take, held = std::move(processor)] { take(); });
+    others.emplace_back([&take, taken = std::move(processor)] { take(); });
   }
   take();
   ++idle_processors();  // this one, while it waits

@@ -2,8 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 namespace bms::measurement {
 namespace {
@@ -27,6 +30,27 @@ TEST(InParallel, TheFirstExceptionArrivesAfterAllHaveEnded) {
     EXPECT_STREQ(error.what(), "3");
   }
   EXPECT_EQ(ended, 20);
+}
+
+/// Pieces call it again; as many threads as processors work, whatever is nested.
+TEST(InParallel, PiecesShareTheProcessors) {
+  const int idle = idle_processors();
+  std::atomic<int> at_work = 0, most = 0, done = 0;
+  const auto outer = [&](std::size_t k) {
+    in_parallel(5, [&](std::size_t) {
+      const int now = ++at_work;
+      for (int seen = most; now > seen && !most.compare_exchange_weak(seen, now);) {
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+      --at_work;
+      ++done;
+    });
+    if (k == 2) throw std::runtime_error("given back as well");
+  };
+  EXPECT_THROW(in_parallel(6, outer), std::runtime_error);
+  EXPECT_EQ(done, 30);
+  EXPECT_LE(most, idle + 1);
+  EXPECT_EQ(idle_processors(), idle);
 }
 
 }  // namespace
