@@ -169,7 +169,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
   return e;
 }
 
-/// Tries steps with growing damping until one lowers the cost, or promises too little to matter.
+/// Tries steps with growing damping until one lowers the cost.
 GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
   StepBounds room{Eigen::VectorXd(m_), Eigen::VectorXd(m_)};
   for (Eigen::Index j = 0; j < m_; ++j)
@@ -180,11 +180,6 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
     const Eigen::VectorXd step = m_ > 0 ? bounded_step(schur_, e.rhs, damping_, room) : Eigen::VectorXd();
     double promised = e.u_gradient.dot(e.u_alone);
     if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
-    if (attempt > 0 && promised < quiet) break;
-    // far below what they promise: the derivatives are taken again, as long as that helps
-    if (attempt >= fit_numerics.attempts_astray && result.astray && renewals_ < fit_numerics.renewals_astray &&
-        !(around_->at == here()))
-      break;
     Hypothesis trial = fit_.hypothesis;
     for (Eigen::Index j = 0; j < m_; ++j)
       parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);

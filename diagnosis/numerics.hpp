@@ -25,7 +25,6 @@ struct Numerics {
   struct Fit {
     int iterations = 12, refit_iterations = 5, nominal_iterations = 6, reduced_iterations = 8, onset_iterations = 4;
     int attempts = 8;                       ///< with growing damping, per iteration
-    int attempts_astray = 3;                ///< if they have gone astray from stale derivatives of the base parameters
     int renewals = 2, renewals_astray = 6;  ///< linearisations of the base parameters at most
     int iterations_after_renewal = 5;
     int iterations_before_hopeless = 3;
