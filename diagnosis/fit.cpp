@@ -106,7 +106,7 @@ class GaussNewton {
   double cost_at_start_ = 0;
   std::shared_ptr<const Linearisation> around_;
   std::optional<LikelihoodModel::Point> derived_at_;
-  Columns by_theta_;         ///< there, per unit step; the last column is the residual
+  Columns by_theta_;         ///< there, per unit step
   Eigen::MatrixXd schur_;    ///< of theta, u eliminated
   Eigen::VectorXd natural_;  ///< d parameter / d step
   double damping_ = fit_numerics.damping;
@@ -135,23 +135,22 @@ GaussNewton::GaussNewton(const LikelihoodModel& likelihood, const Hypothesis& st
 void GaussNewton::derive() {
   if (derived_at_ == here()) return;
   derived_at_ = here();
+  by_theta_ = likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought());
   for (Eigen::Index j = 0; j < m_; ++j) natural_[j] = parameters_.natural(j, parameters_.of(fit_.hypothesis, j));
-  by_theta_.resize(fit_.residual.size(), m_ + 1);
-  by_theta_.leftCols(m_) =
-      likelihood_.derivatives(fit_.hypothesis, fit_.calibration, parameters_.sought()) * natural_.asDiagonal();
+  by_theta_ *= natural_.asDiagonal();
 }
 
 GaussNewton::NormalEquations GaussNewton::normal_equations() {
   derive();
-  by_theta_.col(m_) = fit_.residual;
-  const Eigen::MatrixXd of_theta = squared(by_theta_), of_both = products(around_->columns, by_theta_);
+  const Columns& j_theta = by_theta_;
+  const Columns& j_u = around_->columns;
   NormalEquations e;
-  e.u_gradient = of_both.col(m_) - fit_.calibration;
+  e.u_gradient = j_u.transpose() * fit_.residual - fit_.calibration;
   e.u_alone = around_->normal.solve(e.u_gradient);
   e.within_reach = e.u_gradient.dot(e.u_alone);
   if (m_ == 0) return e;
-  Eigen::VectorXd gradient = of_theta.col(m_).head(m_);
-  Eigen::MatrixXd normal = of_theta.topLeftCorner(m_, m_);
+  Eigen::VectorXd gradient = j_theta.transpose() * fit_.residual;
+  Eigen::MatrixXd normal = squared(j_theta);
   for (Eigen::Index j = 0; j < m_; ++j) {
     const PriorDistance prior = parameters_.prior_distance(j, parameters_.of(fit_.hypothesis, j));
     if (prior.sigma == 0) continue;
@@ -159,7 +158,7 @@ GaussNewton::NormalEquations GaussNewton::normal_equations() {
     gradient[j] -= prior.away * per;
     normal(j, j) += per * per;
   }
-  const Eigen::MatrixXd cross = of_both.leftCols(m_);
+  const Eigen::MatrixXd cross = products(j_u, j_theta);
   e.solved = around_->normal.solve(cross);
   schur_ = normal - cross.transpose() * e.solved;
   e.rhs = gradient - cross.transpose() * e.u_alone;
@@ -174,12 +173,9 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
   StepBounds room{Eigen::VectorXd(m_), Eigen::VectorXd(m_)};
   for (Eigen::Index j = 0; j < m_; ++j)
     std::tie(room.low[j], room.high[j]) = parameters_.room(j, parameters_.of(fit_.hypothesis, j));
-  const double quiet = fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost;
   Attempt result;
   for (int attempt = 0; attempt < fit_numerics.attempts && !result.better; ++attempt) {
     const Eigen::VectorXd step = m_ > 0 ? bounded_step(schur_, e.rhs, damping_, room) : Eigen::VectorXd();
-    double promised = e.u_gradient.dot(e.u_alone);
-    if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
     Hypothesis trial = fit_.hypothesis;
     for (Eigen::Index j = 0; j < m_; ++j)
       parameters_.of(trial, j) = parameters_.moved(j, parameters_.of(fit_.hypothesis, j), step[j]);
@@ -189,16 +185,18 @@ GaussNewton::Attempt GaussNewton::attempt_step(const NormalEquations& e) {
     if (m_ > 0) toward -= e.solved * step;
     const Eigen::VectorXd u = fit_.calibration + way * toward;
     const Eigen::VectorXd residual = likelihood_.residual(trial, u);
-    const double cost = cost_of(trial, u, residual), gained = fit_.cost - cost;
-    if (gained < fit_numerics.kept_promise * promised &&
+    const double cost = cost_of(trial, u, residual);
+    double promised = e.u_gradient.dot(e.u_alone);
+    if (m_ > 0) promised += 2 * e.rhs.dot(step) - step.dot(schur_ * step);
+    if (fit_.cost - cost < fit_numerics.kept_promise * promised &&
         promised > fit_numerics.promise + fit_numerics.promise_share * fit_.cost)
       result.astray = true;
-    if (!(gained > 0)) {  // also where there is no number
+    if (!(cost < fit_.cost)) {  // also where there is no number
       damping_ *= fit_numerics.damping_more;
       continue;
     }
     result.better = true;
-    quiet_ = gained < quiet ? quiet_ + 1 : 0;
+    quiet_ = fit_.cost - cost < fit_numerics.quiet + fit_numerics.quiet_share * fit_.cost ? quiet_ + 1 : 0;
     fit_.hypothesis = trial;
     fit_.calibration = u;
     fit_.residual = residual;
