@@ -46,7 +46,7 @@ struct Numerics {
   };
 
   struct Products {
-    double worth_a_thread = 1e6;  ///< multiplications (half a millisecond) above which further threads begin sooner
+    double worth_a_thread = 1e6;  ///< multiplications, or elements to whiten, from which idle processors take a part
   };
 
   /// Linear algebra of signatures.
