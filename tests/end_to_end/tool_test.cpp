@@ -54,6 +54,8 @@ TEST_F(Tool, BadUsageIsOneLineAndExitCode2) {
       "replay /",
       "simulate --cell table9 --out x.csv",
       "experiment no_such_experiment --out x.csv",
+      "--processors 0 replay " + shift,
+      "--processors many replay " + shift,
   };
   for (const std::string& arguments : wrong) {
     const ToolRun run = run_tool(arguments);
