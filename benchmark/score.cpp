@@ -82,6 +82,29 @@ std::size_t count_findings(const Outcome& o, Score& s) {
   return size;
 }
 
+/// Of a named effect: whether each cause that could be confused with it is.
+void count_isolability(const Outcome& o, Score& s) {
+  if (!named(o) || !o.isolability) return;
+  const std::string& truth = o.answer.ids.front();
+  const diagnosis::Isolability& i = *o.isolability;
+  const auto of_truth = std::find_if(i.causes.begin(), i.causes.end(),
+                                     [&](const auto& c) { return model::catalogue[c.mechanism].id == truth; });
+  if (of_truth == i.causes.end()) return;
+  const auto a = static_cast<std::size_t>(of_truth - i.causes.begin());
+  std::vector<std::string> together;  // named with it, or in its place
+  for (const auto& set : o.sets) {
+    if (contains(set, truth) || !contains(o.found, truth)) together.insert(together.end(), set.begin(), set.end());
+  }
+  for (std::size_t b = 0; b < i.causes.size(); ++b) {
+    const bool confused = contains(together, std::string(model::catalogue[i.causes[b].mechanism].id));
+    if (b == a) continue;
+    if (i.separable[a][b])
+      s.distinguished.count(!confused);
+    else
+      s.confused.count(confused);
+  }
+}
+
 void count_pair(const Outcome& o, Score& s) {
   const std::vector<std::string>& ids = o.answer.ids;
   std::size_t right = 0;
@@ -139,6 +162,7 @@ Score score(const std::vector<Outcome>& outcomes) {
       if (alarm) {
         set_sizes += static_cast<double>(count_findings(o, s));
         overlaps.push_back(o.overlap);
+        count_isolability(o, s);
       }
       count_holdout(o, s.holdout);
     }

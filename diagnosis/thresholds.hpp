@@ -332,6 +332,13 @@ struct Thresholds {
     double initial_soc_at_least = 1e-4;            ///< sigma of the start
   };
 
+  /// Which causes can be distinguished (isolability.hpp).
+  struct Isolability {
+    double times_limit = 2;           ///< size of a cause, in its detection limits
+    std::size_t moments = 12;         ///< at which a contact that changes is compared
+    double trusted_readings = 1'500;  ///< of a second instrument in a recording, at most
+  };
+
   /// Comparison with healthy recordings of the same cell (healthy_null.hpp).
   struct Healthy {
     double log_spread = 0.5;          ///< standard deviation, in ln, of the gain on healthy blocks: that of the
@@ -382,6 +389,7 @@ struct Thresholds {
   References references;
   IdleReading idle_reading;
   Design design;
+  Isolability isolability;
   Healthy healthy;
   ModelTolerance model_tolerance;
 };

@@ -11,6 +11,7 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
+#include "reports/detectability.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/law_chart.hpp"
 #include "reports/report_page.hpp"
@@ -320,20 +321,6 @@ json regimes(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-json limits(const workflow::DiagnoseResult& r) {
-  json list = json::array();
-  for (const diagnosis::DetectionLimit& l : r.diagnosis.limits) {
-    const model::MechanismInfo& info = catalogue[l.mechanism];
-    const model::Parameter& p = info.parameter[l.parameter];
-    list.push_back({{"id", info.id},
-                    {"name", text_of_mechanism(l.mechanism).name},
-                    {"text", diagnosis::parameter_text(p, l.value, 0)},
-                    {"ratio", rounded(l.value / p.upper(r.cell.parameters.capacity_ah), 7)}});
-  }
-  std::stable_sort(list.begin(), list.end(), [](const json& a, const json& b) { return a["ratio"] < b["ratio"]; });
-  return list;
-}
-
 /// A warning with the file's name instead of its path.
 std::string without_folder(const std::string& text, const workflow::DiagnoseResult& r) {
   for (const auto* list : {&r.recordings, &r.holdouts}) {
@@ -379,7 +366,8 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                            {"share", rounded(d.unexplained_share, 4)},
                            {"explained", rounded(d.explained_share, 4)}};
   report["regimes"] = regimes(r);
-  report["limits"] = limits(r);
+  report["limits"] = limits_chart(r);
+  report["isolability"] = isolability_chart(d);
   report["not_testable"] = json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     report["not_testable"].push_back(
@@ -391,7 +379,8 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
   report["charts"] = charts(r);
   report["law"] = law_chart(r);
   const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +
-                             std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_js);
+                             std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_isolability_js) +
+                             std::string(embedded::diagnosis_js);
   return page(embedded::diagnosis_html, script, "bms diagnose",
               in_script(report.dump(-1, ' ', false, json::error_handler_t::replace)));
 }

@@ -1,5 +1,6 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/withheld_text.hpp"
+#include "reports/detectability.hpp"
 #include "reports/json_parts.hpp"
 #include "reports/json_results.hpp"
 
@@ -224,6 +225,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                                   {"parameters", parameters_of(*d.law->mechanism)}}
                                            : Json(nullptr);
   json["detection_limits"] = limits_of(d);
+  json["isolability"] = isolability_json(d);
   json["estimates"] = estimates_of(d);
   json["resistances"] = d.resistances ? Json{{"temperature_c", number(d.resistances->temperature_c)},
                                              {"reference_c", number(d.resistances->reference_c)},

@@ -332,6 +332,7 @@
     draw_unexplained();
     learned_law(get('figure-law'), get('law'));
     draw_regimes();
+    isolability(get('figure-isolability'), get('isolability'));
     draw_limits();
   };
   draw_head();
