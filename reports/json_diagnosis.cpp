@@ -114,6 +114,15 @@ Json limits_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
+/// How much speaks for each law that an unknown cause may act on, the likeliest first.
+Json laws_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::LawEvidence& e : d.law ? d.law->laws : std::vector<diagnosis::LawEvidence>{}) {
+    if (e.law[0] != 0) list.push_back({{"law", e.law}, {"depends_on", e.depends_on}, {"evidence", number(e.gain)}});
+  }
+  return list;
+}
+
 Json estimates_of(const diagnosis::Diagnosis& d) {
   Json list = Json::array();
   for (const diagnosis::ChangeEstimate& e : d.estimates) {
@@ -218,6 +227,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["unexplained"] = {{"rmse_v", number(d.unexplained_rmse_v)}, {"share", number(d.unexplained_share)}};
   json["law"] = d.law ? Json(d.law->law) : Json(nullptr);
   json["depends_on"] = d.law ? Json(d.law->depends_on) : Json::array();
+  json["laws"] = laws_of(d);
   json["left_out"] = d.law && d.law->cell ? Json{{"before_rmse_v", number(d.law->left_out_before_v)},
                                                  {"after_rmse_v", number(d.law->left_out_after_v)}}
                                           : Json(nullptr);
