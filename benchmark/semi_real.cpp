@@ -163,8 +163,21 @@ std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, doubl
   return sizes;
 }
 
+/// The sets of the list that are asked for and whose recordings are there.
+std::vector<RealSet> sets_of(const Options& o, bms::benchmark::Present& present) {
+  bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
+  std::vector<RealSet> sets = bms::benchmark::read_sets(list);
+  list.finish();
+  std::erase_if(sets, [&](const RealSet& s) {
+    return s.name.find(o.only) == std::string::npos || !present.has(s.name, files_of(s));
+  });
+  fmt::print(stderr, "{}", present.skipped_text("sets"));
+  return sets;
+}
+
 void run(const Options& o) {
   std::vector<Result> results;
+  bms::benchmark::NotRun not_run;
   const auto add = [&](Result r) {
     fmt::print("{}", line_of(r));
     std::fflush(stdout);
@@ -175,16 +188,17 @@ void run(const Options& o) {
   };
   if (o.bands_only)
     fmt::print("| cell | set | within the 95 % band | error, RMS | band, RMS |\n|---|---|---|---|---|\n");
-  bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
-  const std::vector<RealSet> sets = bms::benchmark::read_sets(list);
-  list.finish();
+  bms::benchmark::Present present(o.data);
+  const std::vector<RealSet> sets = sets_of(o, present);
+  not_run.skipped = present.skipped();
   for (const RealSet& set : sets) {
-    if (set.name.find(o.only) == std::string::npos) continue;
+    fmt::print(stderr, "set {} of {}: {}\n", &set - sets.data() + 1, sets.size(), set.name);
     Prepared p;
     try {
       p = prepare(o.data, set, !o.without_healthy);
     } catch (const std::runtime_error& error) {  // no cell file, no case
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
+      ++not_run.without_cell_file;
       continue;
     }
     const Band band = band_of(set, p);
@@ -209,7 +223,7 @@ void run(const Options& o) {
   }
   if (o.bands_only) return;
   fmt::print("{}", table_of(results));
-  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results));
+  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results, not_run));
 }
 
 }  // namespace

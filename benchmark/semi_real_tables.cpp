@@ -92,6 +92,52 @@ std::string by_cell(const std::vector<Result>& results) {
   return text;
 }
 
+std::size_t count(const std::vector<Result>& results, const Which& which) {
+  return static_cast<std::size_t>(std::count_if(results.begin(), results.end(), which));
+}
+
+nlohmann::ordered_json json_of_nulls(const std::vector<Result>& results) {
+  const auto verdict = [&](std::string_view what) {
+    return count(results, [&](const Result& r) { return r.fault.empty() && r.verdict == what; });
+  };
+  double hours = 0;
+  for (const Result& r : results) hours += r.fault.empty() ? r.hours : 0;
+  return {{"cases", count(results, [](const Result& r) { return r.fault.empty(); })},
+          {"false", count(results, [](const Result& r) { return r.fault.empty() && r.named; })},
+          {"hours", hours},
+          {"unknown", verdict("UNKNOWN")},
+          {"not_testable", verdict("NOT_TESTABLE")},
+          {"data_fault", verdict("DATA_FAULT")}};
+}
+
+/// Counts of the faults of these sizes.
+nlohmann::ordered_json json_of_sizes(const std::vector<Result>& results, bool within_bounds, double low, double high) {
+  const auto faults = [&](const Which& yes) {
+    return count(results, [&](const Result& r) {
+      return !r.fault.empty() && r.over_limit && r.within_bounds == within_bounds && *r.over_limit >= low &&
+             *r.over_limit < high && yes(r);
+    });
+  };
+  return {{"cases", faults([](const Result&) { return true; })},
+          {"detected", faults([](const Result& r) { return r.detected; })},
+          {"first_right", faults([](const Result& r) { return r.first_right; })},
+          {"another_first", faults([](const Result& r) { return r.named && !r.first_right; })},
+          {"size_compared", faults([](const Result& r) { return r.sigmas.has_value(); })},
+          {"size_within_2_sigma", faults([](const Result& r) { return r.sigmas && std::abs(*r.sigmas) <= 2; })}};
+}
+
+nlohmann::ordered_json json_of_faults(const std::vector<Result>& results) {
+  const double no_end = std::numeric_limits<double>::infinity();
+  nlohmann::ordered_json json = json_of_sizes(results, true, plainly_above, no_end);
+  json["half_limit"] = json_of_sizes(results, true, 0, plainly_below);
+  json["beyond_bounds"] = json_of_sizes(results, false, plainly_above, no_end);
+  json["without_limit"] = {{"cases", count(results, [](const Result& r) { return !r.fault.empty() && !r.over_limit; })},
+                           {"another_first", count(results, [](const Result& r) {
+                              return !r.fault.empty() && !r.over_limit && r.named && !r.first_right;
+                            })}};
+  return json;
+}
+
 }  // namespace
 
 std::string by_size(const std::vector<Result>& results) {
@@ -171,11 +217,12 @@ std::string table_of(const std::vector<Result>& results) {
   return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
 }
 
-std::string json_of(const std::vector<Result>& results) {
+std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Result& r : results) {
     list.push_back({{"set", r.set},
                     {"cell", r.cell},
+                    {"kind", r.fault.empty() ? "null" : "fault"},
                     {"fault", r.fault},
                     {"size", r.size},
                     {"held_out", r.held_out},
@@ -184,15 +231,23 @@ std::string json_of(const std::vector<Result>& results) {
                     {"withheld", r.withheld},
                     {"over_limit", or_null(r.over_limit)},
                     {"within_bounds", r.within_bounds},
+                    {"named", r.named},
+                    {"detected", r.detected},
                     {"first_right", r.first_right},
                     {"sigmas", or_null(r.sigmas)},
                     {"band_within", or_null(r.band_within)},
                     {"band_over_error", or_null(r.band_over_error)},
                     {"error_v", r.error_v},
                     {"remaining_v", r.remaining_v},
+                    {"hours", r.hours},
                     {"wall_s", r.wall_s}});
   }
-  return list.dump(1) + "\n";
+  const nlohmann::ordered_json json = {{"nulls", json_of_nulls(results)},
+                                       {"faults", json_of_faults(results)},
+                                       {"skipped", not_run.skipped},
+                                       {"without_cell_file", not_run.without_cell_file},
+                                       {"results", list}};
+  return json.dump(1) + "\n";
 }
 
 std::string line_of(const SemiRealResult& r) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "benchmark/not_run.hpp"
+
 namespace bms::benchmark {
 
 /// One diagnosis.
@@ -28,6 +30,9 @@ std::string line_of(const SemiRealResult& r);
 std::string by_size(const std::vector<SemiRealResult>& results);
 /// Figures of all development and held-out cells, and of each cell.
 std::string table_of(const std::vector<SemiRealResult>& results);
-std::string json_of(const std::vector<SemiRealResult>& results);
+
+/// Counts of nulls and faults, and every result. Faults are those of twice the stated limit and above, within the
+/// bounds of a real instrument.
+std::string json_of(const std::vector<SemiRealResult>& results, const NotRun& not_run);
 
 }  // namespace bms::benchmark
