@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "benchmark/calibration_error.hpp"
 #include "benchmark/cause_ids.hpp"
 #include "measurement/statistics.hpp"
 
@@ -32,32 +33,6 @@ bool named(const Outcome& o) {
 bool finds(const Outcome& o, std::size_t k, const std::string& id) {
   return contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
 }
-
-/// Expected calibration error: findings in five bins of their probability.
-class Calibration {
- public:
-  void add(double probability, bool right) {
-    Bin& b = bins_[static_cast<std::size_t>(std::min(probability * 5, 4.0))];
-    b.probability += probability;
-    b.right += right ? 1 : 0;
-    ++count_;
-  }
-  std::size_t count() const { return count_; }
-  double error() const {
-    double error = 0;
-    for (const Bin& b : bins_) {
-      if (count_ > 0) error += std::abs(b.probability - b.right) / static_cast<double>(count_);
-    }
-    return error;
-  }
-
- private:
-  struct Bin {
-    double probability = 0, right = 0;
-  };
-  std::array<Bin, 5> bins_{};
-  std::size_t count_ = 0;
-};
 
 void count_holdout(const Outcome& o, Share& share) {
   if (o.holdout_before_v <= 0 || !o.answer.repeats_in_holdout) return;
@@ -125,7 +100,7 @@ Score score(const std::vector<Outcome>& outcomes) {
   Score s;
   std::vector<double> overlaps;
   double set_sizes = 0, wall_s = 0;
-  Calibration calibration;
+  CalibrationError calibration;
   for (const Outcome& o : outcomes) {
     wall_s += o.wall_s;
     const CaseKind kind = o.answer.kind;

@@ -142,9 +142,11 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
                            f.setting.deviation[0]);
     for (const std::size_t e : f.equivalent_to) r.found += "~" + std::string(bms::model::catalogue[e].id);
   }
-  if (fault == nullptr || d.findings.empty() || !bms::diagnosis::names(d.verdict)) return r;
+  if (d.findings.empty() || !bms::diagnosis::names(d.verdict)) return r;
   const Finding& first = d.findings.front();
-  r.first_right = bms::model::catalogue[first.setting.index].id == fault->id;
+  r.probability = first.probability;
+  if (fault == nullptr) return r;
+  r.first_right = r.is_the_fault = bms::model::catalogue[first.setting.index].id == fault->id;
   for (const std::size_t e : first.equivalent_to) r.first_right |= bms::model::catalogue[e].id == fault->id;
   r.sigmas = sigmas_of(first, *fault, size, p.cell.parameters.capacity_ah);
   return r;

@@ -69,7 +69,8 @@ def merged(o):
                   list_of(o.data, "semi_real.toml"), "--all")
     not_run = {f"{key}_{what}": part[key] for key in ("skipped", "without_cell_file")
                for what, part in (("sets", faults), ("cases", natural))}
-    return {"nulls": faults["nulls"], "faults": faults["faults"], "natural": natural["natural"], **not_run,
+    return {"nulls": faults["nulls"], "faults": faults["faults"], "probabilities": faults["probabilities"],
+            "natural": natural["natural"], **not_run,
             "results": faults["results"] + natural["results"]}
 
 

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "benchmark/calibration_error.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::benchmark {
@@ -59,6 +60,31 @@ std::string bands_of(const std::vector<Result>& results, const Which& counts) {
   if (widths.empty()) return "-";
   return fmt::format("{:.1f} %, {:.2g} times", 100 * sum / static_cast<double>(widths.size()),
                      measurement::median(widths));
+}
+
+/// Of the first causes that are named, of nulls as well: how many are the fault that was put in, and whether their
+/// probabilities say so.
+nlohmann::ordered_json json_of_probabilities(const std::vector<Result>& results, const Which& counts) {
+  CalibrationError error;
+  double sum = 0;
+  std::size_t right = 0;
+  for (const Result& r : results) {
+    if (!counts(r) || !r.probability) continue;
+    error.add(*r.probability, r.is_the_fault);
+    sum += *r.probability;
+    right += r.is_the_fault ? 1 : 0;
+  }
+  return {{"named", error.count()},
+          {"right", right},
+          {"mean_probability", error.count() > 0 ? sum / static_cast<double>(error.count()) : 0},
+          {"calibration_error", error.error()}};
+}
+
+std::string probabilities_of(const std::vector<Result>& results, const Which& counts) {
+  const nlohmann::ordered_json j = json_of_probabilities(results, counts);
+  if (j["named"] == 0) return "-";
+  return fmt::format("{} of {}; {:.2f}; {:.2f}", j["right"].get<int>(), j["named"].get<int>(),
+                     j["mean_probability"].get<double>(), j["calibration_error"].get<double>());
 }
 
 /// The same figures for each cell. Faults are those of twice their detection limit and above.
@@ -208,7 +234,10 @@ std::string table_of(const std::vector<Result>& results) {
   row(
       "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
       [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
-  text += "| readings within the 95 % band; its half width over the error |";
+  text += "| first cause is the fault put in; mean of its probability; expected calibration error |";
+  for (const bool held_out : {false, true})
+    text += " " + probabilities_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
+  text += "\n| readings within the 95 % band; its half width over the error |";
   for (const bool held_out : {false, true})
     text += " " + bands_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
   text += "\n" + by_cell(results) + by_size(results);
@@ -234,6 +263,8 @@ std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
                     {"named", r.named},
                     {"detected", r.detected},
                     {"first_right", r.first_right},
+                    {"probability", or_null(r.probability)},
+                    {"is_the_fault", r.is_the_fault},
                     {"sigmas", or_null(r.sigmas)},
                     {"band_within", or_null(r.band_within)},
                     {"band_over_error", or_null(r.band_over_error)},
@@ -242,11 +273,13 @@ std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
                     {"hours", r.hours},
                     {"wall_s", r.wall_s}});
   }
-  const nlohmann::ordered_json json = {{"nulls", json_of_nulls(results)},
-                                       {"faults", json_of_faults(results)},
-                                       {"skipped", not_run.skipped},
-                                       {"without_cell_file", not_run.without_cell_file},
-                                       {"results", list}};
+  const nlohmann::ordered_json json = {
+      {"nulls", json_of_nulls(results)},
+      {"faults", json_of_faults(results)},
+      {"probabilities", json_of_probabilities(results, [](const Result&) { return true; })},
+      {"skipped", not_run.skipped},
+      {"without_cell_file", not_run.without_cell_file},
+      {"results", list}};
   return json.dump(1) + "\n";
 }
 

@@ -17,6 +17,9 @@ struct SemiRealResult {
   std::string verdict, found, withheld;
   bool within_bounds = true;  ///< a real instrument or contact can be that wrong
   bool detected = false, first_right = false, named = false;
+  /// Of a finding: its probability, and whether it is the fault that was put in.
+  std::optional<double> probability = std::nullopt;
+  bool is_the_fault = false;
   std::optional<double> over_limit;       ///< size over the stated detection limit
   std::optional<double> sigmas;           ///< of the found size from the true one
   std::optional<double> band_within;      ///< of a null: share of the readings within the 95 % band of the prediction
