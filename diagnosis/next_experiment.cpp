@@ -211,7 +211,7 @@ std::vector<std::pair<double, const experiments::Experiment*>> courses(const Set
 }  // namespace
 
 std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, const Finding& f,
-                                              bool temperature) {
+                                              bool temperature, const std::vector<std::string>& carried_out) {
   if (f.rivals.empty()) return std::nullopt;
   std::vector<Rival> set = {in_later_recording(f.setting.index, {d.extended, d.covariance})};
   for (std::size_t k = 0; k < f.rivals.size() && set.size() < design_limits.rivals; ++k)
@@ -220,6 +220,7 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
 
   std::optional<Judged> best;
   for (const auto& [duration_s, course] : courses(setting)) {
+    if (std::find(carried_out.begin(), carried_out.end(), course->name) != carried_out.end()) continue;
     std::optional<Judged> j = judged(*course, setting, duration_s, set, d.noise);
     if (!j || j->next.separates.size() < 2) continue;
     const bool enough = j->all;
@@ -230,11 +231,11 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
   return best->next;
 }
 
-std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d,
-                                              bool temperature) {
+std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, bool temperature,
+                                              const std::vector<std::string>& carried_out) {
   for (const Finding& f : d.findings) {
     if (f.rivals.empty()) continue;
-    if (auto next = next_experiment(cell, d, f, temperature)) return next;
+    if (auto next = next_experiment(cell, d, f, temperature, carried_out)) return next;
   }
   return std::nullopt;
 }

@@ -99,6 +99,7 @@ struct Numerics {
     int halvings = 60;  ///< to invert the current sensor's laws
     double covariance_share = 1e-6, covariance = 1e-18;
     double capacity_steps_per_ah = 100;  ///< capacity of a course, rounded down
+    std::size_t shape_points = 400;      ///< by which a recording is compared with a course
   };
 
   double middle_soc = 0.5;  ///< at which a cell's R0, R1 and C1 are compared with a mechanism's

@@ -330,6 +330,10 @@ struct Thresholds {
     double soc_lowest = 0.02, soc_highest = 0.99;  ///< that the cell may reach
     double capacity_lost = 0.995;                  ///< share of the capacity below which the course is made smaller
     double initial_soc_at_least = 1e-4;            ///< sigma of the start
+    double alike = 0.98;                         ///< correlation of the charges from which a recording follows a course
+    double carried_out_share = 0.95;             ///< of a course's duration that is in the recording
+    double scale_least = 0.3, scale_most = 1.5;  ///< recorded charge over that of a course for the nominal capacity
+    double idle_c = 0.02;                        ///< [C] reading of a sensor of which no current flows
   };
 
   /// Comparison with healthy recordings of the same cell (healthy_null.hpp).

@@ -14,6 +14,7 @@
 #include "reports/embedded_files.hpp"
 #include "reports/law_chart.hpp"
 #include "reports/report_page.hpp"
+#include "workflow/next_steps.hpp"
 
 namespace bms::reports {
 
@@ -384,10 +385,7 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
   for (const diagnosis::NotTestable& n : d.not_testable)
     report["not_testable"].push_back(
         {{"id", catalogue[n.mechanism].id}, {"name", text_of_mechanism(n.mechanism).name}, {"reason", n.reason}});
-  report["next"] = r.next ? json{{"why", diagnosis::why(*r.next)},
-                                 {"instruction", diagnosis::instruction(*r.next)},
-                                 {"command", diagnosis::command(*r.next)}}
-                          : json(nullptr);
+  report["next"] = workflow::next_steps(r);
   report["charts"] = charts(r);
   report["law"] = law_chart(r);
   const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +

@@ -175,13 +175,14 @@ Json withheld_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
-Json experiment_of(const diagnosis::NextExperiment& next) {
+Json experiment_of(const diagnosis::NextExperiment& next, const std::string& then) {
   return {{"profile", next.profile},
           {"separates", ids_of(next.separates)},
           {"leaves", ids_of(next.leaves)},
           {"why", diagnosis::why(next)},
           {"command", diagnosis::command(next)},
           {"instruction", diagnosis::instruction(next)},
+          {"then", then},
           {"start_soc", number(next.start_soc)},
           {"duration_s", number(next.duration_s)},
           {"expected_gain", number(next.gain)}};
@@ -233,7 +234,8 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["not_testable"] = Json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
-  json["next_experiment"] = r.next ? experiment_of(*r.next) : Json(nullptr);
+  json["next_experiment"] = r.next ? experiment_of(*r.next, r.then) : Json(nullptr);
+  json["nothing_more"] = r.nothing_more.empty() ? Json(nullptr) : Json(r.nothing_more);
   json["faults"] = Json::array();
   for (const diagnosis::DataFault& f : d.faults)
     json["faults"].push_back({{"id", f.id}, {"text", f.text}, {"spans", spans_of(f.spans)}});

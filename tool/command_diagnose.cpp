@@ -1,6 +1,7 @@
 // bms diagnose: where a calibrated cell and its recordings disagree, and which physics or instrument fault causes it.
 #include <cmath>
 #include <csignal>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -13,6 +14,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "workflow/diagnose_recordings.hpp"
+#include "workflow/next_steps.hpp"
 #include "workflow/pack_diagnosis.hpp"
 
 namespace bms::tool {
@@ -74,9 +76,10 @@ std::string summary(const workflow::DiagnoseResult& r) {
     for (const std::string& at : at_temperature_text(r.diagnosis, r.diagnosis.resistances->cell))
       text += diagnosis::capitalised(at) + ".\n";
   }
-  if (r.next) {
-    text += fmt::format("{}\n  {}\n  {}\n", diagnosis::why(*r.next), diagnosis::instruction(*r.next),
-                        diagnosis::command(*r.next));
+  std::string_view indent;
+  for (const std::string& step : workflow::next_steps(r)) {
+    text += fmt::format("{}{}\n", indent, step);
+    indent = "  ";
   }
   text += comparison_text(r);
   if (!r.out.empty()) text += "Cell file: " + r.out + "\n";
@@ -183,7 +186,7 @@ class DiagnoseCommand final : public Command {
       result.warnings.push_back(
           {"interrupted", "stopped by Ctrl-C: later steps of the search might have changed this result"});
     } else {
-      workflow::add_next_experiment(result);
+      workflow::add_next_experiment(o_, result);
     }
     workflow::add_holdout_warnings(result);
     result.out = out_;

@@ -36,6 +36,8 @@ struct DiagnoseResult {
   std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
   std::optional<SocErrors> soc;                   ///< of the hold-outs with a reference
   std::optional<diagnosis::NextExperiment> next;  ///< separates the causes that are still possible
+  std::string then;                               ///< command that diagnoses its recording together with these
+  std::string nothing_more;                       ///< why there is no next one, where causes are still ambiguous
   std::string out;
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;

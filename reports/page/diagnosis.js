@@ -247,7 +247,7 @@
       draw_share(box);
     else if (report.error_mv !== null)
       make(box, 'p', mv(report.error_mv) + ' RMS between recording and cell file' + floor_text + '.', 'why');
-    if (next) make(box, 'p', [next.why, next.instruction, next.command].join(' '), 'action');
+    for (const step of next) make(box, 'p', step, 'action');
     for (const m of report.mechanisms) {
       const p = make(box, 'p', undefined, 'action');
       make(p, 'b', title_of(m.name) + ': ');

@@ -268,10 +268,14 @@ TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
   EXPECT_GT(next["expected_gain"], 7);
   EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To distinguish "));
   EXPECT_THAT(content(path("r.html")), HasSubstr("bms experiment meter_check"));
+  const std::string then = next["then"], measured = "meter_check_measured.csv";
+  EXPECT_EQ(then,
+            "bms diagnose --cell table9 --recording " + now + " --recording " + measured + " --initial-soc 0.98 0.95");
+  EXPECT_THAT(content(path("r.html")), HasSubstr(then));
   ASSERT_EQ(run_tool("experiment meter_check --out " + path("p.csv")).exit_code, 0);
   // readings of the faulty channel: of the source, and of the resting cell
   std::istringstream profile(content(path("p.csv")));
-  std::ofstream later(path("later.csv"));
+  std::ofstream later(path(measured));
   std::string line;
   std::getline(profile, line);
   ASSERT_EQ(line, "time_s,current_a,current_ref_a,voltage_ref_v");
@@ -281,12 +285,14 @@ TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
     later << line << "," << (source.empty() ? 3.3895 : std::stod(source)) + 0.012 + 0.001 * ((7 * k) % 5 - 2) << "\n";
   }
   later.close();
-  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " +
-                           path("later.csv"));
+  std::string both_arguments = then.substr(std::string("bms diagnose ").size());
+  both_arguments.replace(both_arguments.find(measured), measured.size(), path(measured));
+  const json both = result(both_arguments);
   EXPECT_EQ(both["verdict"], "CAUSE");
   EXPECT_EQ(both["mechanisms"][0]["id"], "voltage_offset");
   EXPECT_NEAR(both["mechanisms"][0]["parameters"][0]["value"], 0.012, 0.001);
   EXPECT_TRUE(both["next_experiment"].is_null());
+  EXPECT_TRUE(both["nothing_more"].is_null()) << "one cause is left";
 }
 
 TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {
