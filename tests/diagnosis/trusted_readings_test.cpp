@@ -79,6 +79,18 @@ TEST(TrustedReadings, AContactIsNotInARecordingBeforeIt) {
   EXPECT_GT(second, 0.1);
 }
 
+TEST(TrustedReadings, AGainIsNotReadOffWhereNoCurrentFlows) {
+  for (const double offset_a : {0.0, 0.02, 0.5}) {
+    PreparedRecording r = test::recorded(std::vector<double>(1'800, 0.0), 0.8, 1);
+    r.current_ref_a = std::vector<double>(r.size(), 0.0);  // the contactor is open
+    for (double& a : r.current_a.edit()) a += offset_a;
+    for (const InstrumentError& e : compare_instruments({r}, test::table9())) {
+      EXPECT_EQ(e.setting.index, model::mechanism_index_of<model::CurrentOffset>) << offset_a;
+      EXPECT_TRUE(std::isfinite(e.gain) && std::isfinite(e.setting.deviation[0]));
+    }
+  }
+}
+
 /// A finding with this mechanism, as its cause or a rival.
 bool suspects(const Diagnosis& d, std::size_t mechanism) {
   return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& f) {
