@@ -99,6 +99,16 @@ void count_pair(const Outcome& o, Score& s) {
   s.pair_one_none_wrong.count(named(o) && right >= 1 && !wrong);
 }
 
+/// Experiments that an ambiguous diagnosis has led to. Returns their number.
+std::size_t count_experiments(const FollowUp& up, Score& s) {
+  s.decided_at_once.count(up.decided_at_once);
+  s.decided.count(up.decided);
+  s.nothing_more.count(up.nothing_more);
+  if (up.decided_at_once) s.right_at_once.count(up.right_at_once);
+  if (up.decided) s.right.count(up.right);
+  return up.rounds.size();
+}
+
 }  // namespace
 
 Interval wilson(const Share& share) {
@@ -124,7 +134,7 @@ bool no_alarm(const Outcome& o) { return o.verdict == Verdict::no_mismatch || o.
 Score score(const std::vector<Outcome>& outcomes) {
   Score s;
   std::vector<double> overlaps;
-  double set_sizes = 0, wall_s = 0;
+  double set_sizes = 0, wall_s = 0, experiments = 0;
   Calibration calibration;
   for (const Outcome& o : outcomes) {
     wall_s += o.wall_s;
@@ -143,6 +153,7 @@ Score score(const std::vector<Outcome>& outcomes) {
       count_holdout(o, s.holdout);
     }
     if (kind == CaseKind::single && o.next) s.separated.count(o.next->separated);
+    if (o.next) experiments += static_cast<double>(count_experiments(*o.next, s));
     if (kind == CaseKind::pair && o.answer.ids.size() == 2) count_pair(o, s);
     if (named(o) && (kind == CaseKind::single || kind == CaseKind::null || kind == CaseKind::outside))
       calibration.add(o.probability, kind == CaseKind::single && o.found.front() == o.answer.ids.front());
@@ -151,6 +162,7 @@ Score score(const std::vector<Outcome>& outcomes) {
   s.calibration_error = calibration.error();
   if (!overlaps.empty()) s.median_overlap = measurement::upper_median(overlaps);
   s.mean_set_size = s.in_set.of > 0 ? set_sizes / static_cast<double>(s.in_set.of) : 0;
+  s.mean_experiments = s.decided.of > 0 ? experiments / static_cast<double>(s.decided.of) : 0;
   s.mean_wall_s = outcomes.empty() ? 0 : wall_s / static_cast<double>(outcomes.size());
   return s;
 }
