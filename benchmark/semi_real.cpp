@@ -20,8 +20,7 @@
 #include "benchmark/real_cell.hpp"
 #include "benchmark/run_program.hpp"
 #include "benchmark/semi_real_tables.hpp"
-#include "diagnosis/predicted_band.hpp"
-#include "diagnosis/prepare.hpp"
+#include "diagnosis/prediction_interval.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
 #include "measurement/statistics.hpp"
@@ -46,35 +45,18 @@ struct Options {
 };
 
 /// The band of the prediction on the recording that is left out.
-struct Band {
-  double within = 0;                     ///< share of the readings within 1.96 standard deviations
-  double error_v = 0, half_width_v = 0;  ///< RMS
-};
-
-Band band_of(const RealSet& set, const Prepared& p) {
+bms::diagnosis::Coverage band_of(const RealSet& set, const Prepared& p) {
   const bms::diagnosis::PreparedRecording record =
       bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
-  const bms::diagnosis::LikelihoodModel likelihood =
-      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record});
-  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy),
-                            file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
-  std::size_t within = 0, of = 0;
-  bms::measurement::MeanSquare error, band;
-  for (std::size_t k = 0; k < record.size(); ++k) {
-    const double e = record.voltage_v[k] - file_v[k];
-    if (!std::isfinite(e)) continue;
-    constexpr double two_sided_95 = 1.96;
-    within += std::abs(e) <= two_sided_95 * sigma_v[k] ? 1 : 0;
-    ++of;
-    error.add(e);
-    band.add(two_sided_95 * sigma_v[k]);
-  }
-  return {static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(of, 1)), error.root(), band.root()};
+  return bms::diagnosis::prediction_interval(p.cell.parameters, p.cell.mechanisms, record,
+                                             bms::diagnosis::predict(p.cell.parameters, p.cell.mechanisms, record),
+                                             p.cell.healthy)
+      .coverage;
 }
 
-void print_band(const RealSet& set, const Band& band) {
-  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name, 100 * band.within,
-             1e3 * band.error_v, 1e3 * band.half_width_v);
+void print_band(const RealSet& set, const bms::diagnosis::Coverage& band) {
+  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name, 100 * band.share(),
+             1e3 * band.error_v(), 1e3 * band.half_width_v());
   std::fflush(stdout);
 }
 
@@ -187,15 +169,15 @@ void run(const Options& o) {
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
       continue;
     }
-    const Band band = band_of(set, p);
+    const bms::diagnosis::Coverage band = band_of(set, p);
     if (o.bands_only) {
       print_band(set, band);
       continue;
     }
     std::map<std::string, double> limits;
     Result null = diagnose(o, set, p, p.test, nullptr, 0, limits);
-    null.band_within = band.within;
-    null.band_over_error = band.half_width_v / band.error_v;
+    null.band_within = band.share();
+    null.band_over_error = band.half_width_v() / band.error_v();
     add(std::move(null));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
