@@ -11,6 +11,7 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
+#include "reports/diagnosis_charts.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/law_chart.hpp"
 #include "reports/report_page.hpp"
@@ -23,14 +24,8 @@ using diagnosis::text_of_mechanism;
 using model::catalogue;
 using nlohmann::json;
 
-constexpr std::size_t strip_bins = 600;     ///< of the strip, over all recordings: the width of a screen
-constexpr std::size_t chart_rows = 40'000;  ///< of the charts, over all recordings
+constexpr std::size_t strip_bins = 600;  ///< of the strip, over all recordings: the width of a screen
 constexpr std::size_t regime_bins = 30;
-
-json rounded(double value, int decimals) {
-  const double scale = std::pow(10, decimals);
-  return std::isfinite(value) ? json(std::round(value * scale) / scale) : json(nullptr);
-}
 
 json rms_mv(const identification::ErrorFigure& error) {
   return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr);
@@ -192,34 +187,6 @@ json figures(const workflow::DiagnoseResult& r) {
     list.push_back(figure(r.recordings.size() == 1 ? "diagnosed: " + r.recordings.front().record.name
                                                    : fmt::format("{} recordings diagnosed", r.recordings.size()),
                           r.baseline, r.extended));
-  return list;
-}
-
-json chart_of(const workflow::DiagnoseResult& r, const workflow::RecordingComparison& c, bool holdout,
-              std::size_t most) {
-  json chart = {{"name", c.record.name}, {"holdout", holdout}};
-  const auto rows = shown_rows(c.recording, most);
-  const auto add = [&](const char* name, int decimals, auto&& value) {
-    json column = json::array();
-    for (const std::size_t k : rows) column.push_back(rounded(value(k), decimals));
-    chart[name] = std::move(column);
-  };
-  add("time_s", 3, [&](std::size_t k) { return c.record.time_s[k] - c.record.time_s.front(); });
-  add("measured_v", 4, [&](std::size_t k) { return c.record.voltage_v[k]; });
-  add("base_v", 4, [&](std::size_t k) { return c.base_v[k]; });
-  add("before_mv", 2, [&](std::size_t k) { return 1e3 * (c.record.voltage_v[k] - c.base_v[k]); });
-  if (r.named()) {
-    add("extended_v", 4, [&](std::size_t k) { return c.extended_v[k]; });
-    add("after_mv", 2, [&](std::size_t k) { return 1e3 * (c.record.voltage_v[k] - c.extended_v[k]); });
-  }
-  return chart;
-}
-
-json charts(const workflow::DiagnoseResult& r) {
-  json list = json::array();
-  const std::size_t most = std::max<std::size_t>(2'000, chart_rows / (r.recordings.size() + r.holdouts.size()));
-  for (const workflow::RecordingComparison& c : r.holdouts) list.push_back(chart_of(r, c, true, most));
-  for (const workflow::RecordingComparison& c : r.recordings) list.push_back(chart_of(r, c, false, most));
   return list;
 }
 
@@ -388,7 +355,8 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                                  {"instruction", diagnosis::instruction(*r.next)},
                                  {"command", diagnosis::command(*r.next)}}
                           : json(nullptr);
-  report["charts"] = charts(r);
+  report["charts"] = diagnosis_charts(r);
+  report["intervals"] = interval_texts(r);
   report["law"] = law_chart(r);
   const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +
                              std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_js);

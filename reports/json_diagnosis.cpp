@@ -2,6 +2,7 @@
 #include "diagnosis/withheld_text.hpp"
 #include "reports/json_parts.hpp"
 #include "reports/json_results.hpp"
+#include "workflow/diagnosis_comparison.hpp"
 
 namespace bms::reports {
 
@@ -75,6 +76,26 @@ Json inputs_of(const std::vector<workflow::RecordingComparison>& recordings) {
                     {"initial_soc_sigma", c.record.initial_soc_sigma}});
   }
   return list;
+}
+
+Json holdouts_of(const std::vector<workflow::RecordingComparison>& holdouts) {
+  Json list = Json::array();
+  for (const workflow::RecordingComparison& c : holdouts) {
+    list.push_back({{"path", c.recording.path},
+                    {"samples", c.record.size()},
+                    {"initial_soc", c.record.initial_soc},
+                    {"coverage", number(c.interval.coverage.share())},
+                    {"half_width_v", number(c.interval.coverage.half_width_v())}});
+  }
+  return list;
+}
+
+/// Share of the readings within the 95 % interval of the extended cell.
+Json coverage_of(const workflow::DiagnoseResult& r) {
+  const auto share = [](const std::optional<diagnosis::Coverage>& c) { return c ? number(c->share()) : Json(nullptr); };
+  return {{"nominal", diagnosis::nominal_coverage},
+          {"recording", share(coverage(r.recordings))},
+          {"holdout", share(coverage(r.holdouts))}};
 }
 
 Json location_of(const diagnosis::Diagnosis& d) {
@@ -195,10 +216,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["command"] = "diagnose";
   json["cell"] = r.cell.name;
   json["recordings"] = inputs_of(r.recordings);
-  json["holdouts"] = Json::array();
-  for (const workflow::RecordingComparison& c : r.holdouts)
-    json["holdouts"].push_back(
-        {{"path", c.recording.path}, {"samples", c.record.size()}, {"initial_soc", c.record.initial_soc}});
+  json["holdouts"] = holdouts_of(r.holdouts);
   json["verdict"] = name_of(d.verdict);
   json["statement"] = d.statement;
   json["location"] = location_of(d);
@@ -211,6 +229,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["candidates"] = candidates_of(d);
   json["baseline"] = {{"recording", figures_of(r.baseline)}, {"holdout", figures_of(r.baseline_holdout)}};
   json["extended"] = {{"recording", figures_of(r.extended)}, {"holdout", figures_of(r.extended_holdout)}};
+  json["coverage"] = coverage_of(r);
   json["soc"] =
       r.soc ? Json{{"baseline_rmse", r.soc->baseline_rmse}, {"extended_rmse", r.soc->extended_rmse}} : Json(nullptr);
   json["noise_floor_v"] = number(d.noise_floor_v);

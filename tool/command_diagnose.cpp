@@ -7,6 +7,7 @@
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
+#include "reports/diagnosis_charts.hpp"
 #include "reports/diagnosis_page.hpp"
 #include "reports/json_results.hpp"
 #include "reports/pack_results.hpp"
@@ -58,6 +59,7 @@ std::string comparison_text(const workflow::DiagnoseResult& r) {
         "{:.2f} mV.\n",
         1e3 * r.baseline_holdout->rmse_v, 1e3 * r.extended_holdout->rmse_v, 1e3 * r.diagnosis.noise_floor_v);
   }
+  for (const std::string& line : reports::interval_texts(r)) text += line + "\n";
   if (r.soc) {
     text += fmt::format("Error of their estimated state of charge: {:.2f} % RMS before, {:.2f} % after.\n",
                         100 * r.soc->baseline_rmse, 100 * r.soc->extended_rmse);

@@ -143,7 +143,7 @@ RecordingComparison prepared(measurement::Recording r, const std::string& name, 
                                       .initial_soc_given = start.given,
                                       .checks = {}};
   diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
-  return {std::move(r), std::move(record), {}, {}};
+  return {std::move(r), std::move(record), {}, {}, {}};
 }
 
 DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
@@ -188,6 +188,7 @@ DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options
   r.baseline_holdout = figures(r.holdouts, &RecordingComparison::base_v);
   r.extended_holdout = figures(r.holdouts, &RecordingComparison::extended_v);
   r.extended_cell = extended_cell(r);
+  add_intervals(r);
   r.soc = soc_errors(r);
   r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return r;

@@ -7,6 +7,7 @@
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/next_experiment.hpp"
+#include "diagnosis/prediction_interval.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 
@@ -27,6 +28,7 @@ struct RecordingComparison {
   measurement::Recording recording;
   diagnosis::PreparedRecording record;
   std::vector<double> base_v, extended_v;  ///< open loop, by row
+  diagnosis::PredictionInterval interval;  ///< around extended_v
 };
 
 struct DiagnoseResult {

@@ -172,6 +172,7 @@
     key(cell_colour, 'cell file');
     if (report.named) key(blue, 'extended');
     if (report.floor_mv > 0) draw(s, 'text', {x: from, y: y}, '\u2506 noise floor ' + mv(report.floor_mv));
+    for (const text of report.intervals) make(box, 'p', text, 'why');
     if (report.has_holdout || !report.named) return;
     const p = make(box, 'p', 'There was no hold-out recording. To check the result, give a later one with ', 'why');
     make(p, 'code', '--holdout');
@@ -289,9 +290,17 @@
   const chart = (c, title, columns, tall) => {
     const box = make(get('curves'), 'figure'), caption = make(box, 'figcaption', title + ' ');
     const legend = make(caption, 'span', '', 'legend');
-    const rows = c.time_s.map((t, k) => [t / 3600, ...columns.map(column => column.values[k])]);
+    const bands = columns.some(column => column.half);
+    const value = (column, k) => {
+      const v = column.values[k];
+      if (!bands) return v;
+      const half = column.half ? column.half[k] : 0;
+      return v === null ? [null, null, null] : [v - half, v, v + half];
+    };
+    const rows = c.time_s.map((t, k) => [t / 3600, ...columns.map(column => value(column, k))]);
     return new Dygraph(make(box, 'div', undefined, tall ? 'chart tall' : 'chart'), rows, {
       labels: ['time', ...columns.map(column => column.label)],
+      customBars: bands,
       labelsDiv: legend,
       legend: 'always',
       colors: columns.map(column => column.colour),
@@ -313,6 +322,11 @@
       if (c.extended_v !== undefined) {
         volts.push({label: 'extended, V', values: c.extended_v, colour: blue});
         errors.push({label: 'extended, mV', values: c.after_mv, colour: blue});
+      }
+      if (c.half_width_v) {
+        const last = volts[volts.length - 1], half = c.half_width_v.map(v => 1e3 * v);
+        Object.assign(last, {label: last.label.replace(',', ' with its 95 % interval,'), half: c.half_width_v});
+        errors.unshift({label: '95 % interval, mV', values: half.map(() => 0), half: half, colour: grey});
       }
       volts.push({label: 'measured, V', values: c.measured_v, colour: dark});
       const pair = [

@@ -81,6 +81,12 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
   EXPECT_GT(r["baseline"]["holdout"]["rmse_v"], 0.008);
   EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.0013) << "1 mV of noise";
   EXPECT_LT(r["soc"]["extended_rmse"], r["soc"]["baseline_rmse"]);
+  // around the extended cell's voltage; the cell file's is off by up to 15 mV
+  EXPECT_EQ(r["coverage"]["nominal"], 0.95);
+  EXPECT_GT(r["coverage"]["recording"], 0.95);
+  EXPECT_GT(r["coverage"]["holdout"], 0.95);
+  EXPECT_EQ(r["coverage"]["holdout"], r["holdouts"][0]["coverage"]);
+  EXPECT_LT(r["holdouts"][0]["half_width_v"], 0.015);
   // the extended cell file works in other commands
   const std::string cell = content(path("x.toml"));
   EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
@@ -137,15 +143,36 @@ TEST_F(DiagnoseTool, TheShiftItselfHasNoMismatchAndLeavesTheCellUnchanged) {
   EXPECT_GT(r["detection_limits"].size(), 10U);
   EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("would have revealed"));
   EXPECT_TRUE(r["baseline"]["holdout"].is_null());
+  EXPECT_TRUE(r["coverage"]["holdout"].is_null());
+  EXPECT_GT(r["coverage"]["recording"], 0.95);
   EXPECT_EQ(r["baseline"]["recording"], r["extended"]["recording"]);
   EXPECT_THAT(content(path("x.toml")), HasSubstr("name = \"table9\"\n"));
   EXPECT_THAT(content(path("x.toml")), HasSubstr("NO_MISMATCH, nothing was added"));
 }
 
+TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
+  const auto rest = [&](const std::string& name, double above_v) {
+    return made(
+        name, 2'000, 1, [](int) { return 0.0; }, [&](int k) { return 3.286 + above_v + 0.001 * (k % 2); });
+  };
+  const ToolRun run =
+      run_tool("diagnose --cell table9 --initial-soc 0.5 --recording " + rest("now.csv", 0) + " --holdout " +
+               rest("same.csv", 0) + " " + rest("higher.csv", 0.1) + " --json " + path("r.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out,
+              HasSubstr("\nThe 95 % interval of the prediction contains 100.0 % of the readings of same.csv;"));
+  EXPECT_THAT(run.out,
+              HasSubstr("\nThe 95 % interval of the prediction contains 0.0 % of the readings of higher.csv;"));
+  const json r = json::parse(content(path("r.json")));
+  EXPECT_EQ(r["coverage"]["recording"], 1.0);
+  EXPECT_EQ(r["coverage"]["holdout"], 0.5) << "both together";
+  EXPECT_EQ(r["holdouts"][1]["coverage"], 0.0);
+}
+
 TEST_F(DiagnoseTool, HasAllFieldsOfTheContractForEveryVerdict) {
   const auto complete = [](const json& r) {
     for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline",
-                            "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
+                            "extended", "coverage", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
                             "next_experiment", "wall_s", "warnings"}) {
       EXPECT_TRUE(r.contains(key)) << key;
     }
