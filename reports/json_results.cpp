@@ -113,7 +113,14 @@ std::string json_of(const files::CellFile& cell, const std::vector<std::string>&
                   {"doubts", doubts}});
 }
 
-std::string json_of(const host_sim::SimulationResult& r) {
+std::string json_of(const host_sim::SimulationResult& r, const std::optional<diagnosis::Coverage>& coverage) {
+  Json measured = nullptr;
+  if (coverage) {
+    measured = {{"nominal", diagnosis::nominal_coverage},
+                {"recording", number(coverage->share())},
+                {"half_width_v", number(coverage->half_width_v())},
+                {"rmse_v", number(coverage->error_v())}};
+  }
   return text_of({{"command", "simulate"},
                   {"cell", r.cell},
                   {"input", r.input},
@@ -124,6 +131,7 @@ std::string json_of(const host_sim::SimulationResult& r) {
                   {"initial_soc", r.initial_soc},
                   {"final_soc", r.final_soc},
                   {"final_voltage_v", r.final_voltage_v},
+                  {"coverage", measured},
                   {"steps_per_second", r.steps_per_second},
                   {"warnings", warnings_of(r.warnings)}});
 }
