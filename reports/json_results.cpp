@@ -243,7 +243,12 @@ Json joint_of(const std::optional<workflow::JointResult>& joint) {
   }
   json["left_outs"] = json["held_out"] = Json::array();
   for (const identification::LeftOutError& e : choice.left_outs) json["left_outs"].push_back(left_out_of(e));
-  for (const identification::LeftOutError& e : joint->held_out) json["held_out"].push_back(left_out_of(e));
+  for (std::size_t k = 0; k < joint->held_out.size(); ++k) {
+    json["held_out"].push_back(left_out_of(joint->held_out[k]));
+    if (k >= joint->coverage.size()) continue;
+    json["held_out"].back()["coverage"] = number(joint->coverage[k].share());
+    json["held_out"].back()["half_width_v"] = number(joint->coverage[k].half_width_v());
+  }
   const identification::ModelErrors& errors = choice.errors;
   json["errors"] = {{"resistance_fraction", errors.resistance_fraction},
                     {"resistance_per_ev", errors.resistance_per_ev},
