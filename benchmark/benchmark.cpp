@@ -42,23 +42,47 @@ std::string joined(const std::vector<std::string>& ids, const char* by) {
   return text;
 }
 
+std::string joined_sets(const std::vector<std::vector<std::string>>& sets) {
+  std::string text;
+  for (const auto& set : sets) text += (text.empty() ? "" : " + ") + joined(set, "~");
+  return text;
+}
+
 std::string line_of(std::size_t index, const Outcome& o) {
-  std::string found;
-  for (const auto& set : o.sets) found += (found.empty() ? "" : " + ") + joined(set, "~");
   std::string line = fmt::format(
       "{:3} {:10} {:40} x{:<5.1f} {:16} -> {:13} {:50} iou {:.2f} hold {:.1f}->{:.1f} ({:.1f}) mV {:.1f} s  {}\n",
       index, truth::name_of(o.answer.kind), joined(o.answer.ids, "+"), o.answer.strength, o.answer.profile,
-      bms::diagnosis::name_of(o.verdict), found, o.overlap, 1e3 * o.holdout_before_v, 1e3 * o.holdout_after_v,
-      1e3 * o.holdout_floor_v, o.wall_s, o.figures);
+      bms::diagnosis::name_of(o.verdict), joined_sets(o.sets), o.overlap, 1e3 * o.holdout_before_v,
+      1e3 * o.holdout_after_v, 1e3 * o.holdout_floor_v, o.wall_s, o.figures);
   if (o.next) {
-    std::string after;
-    for (const auto& set : o.next->sets) after += (after.empty() ? "" : " + ") + joined(set, "~");
-    line += fmt::format("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {}{}\n", index, "",
-                        joined(o.answer.ids, "+"), o.next->profile.empty() ? "none" : o.next->profile,
-                        o.next->duration_s / 3'600, o.next->expected_gain, o.next->plan_wall_s, after,
-                        o.next->separated ? "" : "  NOT SEPARATED");
+    for (const bms::benchmark::Round& r : o.next->rounds)
+      line += fmt::format("{:3} {:10} {:40} next: {} ({:.1f} h, gain {:.0f}, planned in {:.1f} s) -> {} {}\n", index,
+                          "", joined(o.answer.ids, "+"), r.profile, r.duration_s / 3'600, r.expected_gain,
+                          r.plan_wall_s, bms::diagnosis::name_of(r.verdict), joined_sets(r.sets));
+    line += fmt::format("{:3} {:10} {:40} end: {}{}\n", index, "", joined(o.answer.ids, "+"),
+                        bms::benchmark::end_of(*o.next),
+                        o.next->separated ? "" : "; the first experiment has not separated");
   }
   return line;
+}
+
+nlohmann::ordered_json json_of(const bms::benchmark::FollowUp& up) {
+  nlohmann::ordered_json rounds = nlohmann::ordered_json::array();
+  for (const bms::benchmark::Round& r : up.rounds) {
+    rounds.push_back({{"profile", r.profile},
+                      {"duration_s", r.duration_s},
+                      {"expected_gain", r.expected_gain},
+                      {"verdict", bms::diagnosis::name_of(r.verdict)},
+                      {"sets", r.sets}});
+  }
+  return {{"rounds", rounds},
+          {"end", bms::benchmark::end_of(up)},
+          {"separated", up.separated},
+          {"decided_at_once", up.decided_at_once},
+          {"right_at_once", up.right_at_once},
+          {"decided", up.decided},
+          {"right", up.right},
+          {"nothing_more", up.nothing_more}};
 }
 
 std::string json_of(const Options& options, const std::vector<Column>& columns) {
@@ -70,6 +94,8 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
   for (const Column& c : columns) {
     Json& list = json["methods"][c.method] = Json::array();
     for (const Outcome& o : c.outcomes) {
+      Json after;
+      if (o.next) after = json_of(*o.next);
       list.push_back({{"kind", truth::name_of(o.answer.kind)},
                       {"ids", o.answer.ids},
                       {"strength", o.answer.strength},
@@ -83,7 +109,8 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
                       {"holdout_after_v", o.holdout_after_v},
                       {"holdout_floor_v", o.holdout_floor_v},
                       {"wall_s", o.wall_s},
-                      {"figures", o.figures}});
+                      {"figures", o.figures},
+                      {"experiments", after}});
     }
   }
   return json.dump(1) + "\n";

@@ -41,6 +41,32 @@ diagnosis::PreparedRecording carried_out(const truth::Case& c, const model::Cell
   return r;
 }
 
+/// A loop that needs more would tire any technician.
+constexpr std::size_t most_rounds = 4;
+
+bool has_rivals(const std::vector<std::vector<std::string>>& sets) {
+  return std::any_of(sets.begin(), sets.end(), [](const auto& set) { return set.size() > 1; });
+}
+
+/// Returns true if causes are named and none has a rival.
+bool decided(const Round& r) { return diagnosis::names(r.verdict) && !has_rivals(r.sets); }
+
+/// Returns true if these are decided and true.
+bool right(const Round& r, const truth::Answer& answer) {
+  return decided(r) &&
+         std::all_of(r.sets.begin(), r.sets.end(), [&](const auto& set) { return contains(answer.ids, set.front()); });
+}
+
+/// Returns true if the true effect is named and no other that was confused with it.
+bool separated(const Round& r, const std::string& truth, const std::vector<std::string>& confused) {
+  bool named = false, rival = false;
+  for (const auto& set : r.sets) {
+    named = named || contains(set, truth);
+    for (const std::string& id : set) rival = rival || (id != truth && contains(confused, id));
+  }
+  return named && !rival;
+}
+
 }  // namespace
 
 std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
@@ -53,28 +79,46 @@ std::vector<std::vector<std::string>> sets_of(const diagnosis::Diagnosis& d) {
   return sets;
 }
 
+const char* end_of(const FollowUp& up) {
+  if (up.decided) return up.right ? "right" : "WRONG";
+  if (up.nothing_more) return "nothing more can be learned";
+  if (up.rounds.empty()) return "no experiment";
+  const diagnosis::Verdict verdict = up.rounds.back().verdict;
+  return diagnosis::names(verdict) ? "still ambiguous" : diagnosis::name_of(verdict);
+}
+
 std::optional<FollowUp> follow_up(const truth::Case& c, const model::CellParameters<>& cell,
                                   const diagnosis::PreparedRecording& recording, const diagnosis::Diagnosis& first) {
   if (first.verdict != diagnosis::Verdict::ambiguous || !c.run_test) return std::nullopt;
   FollowUp up;
-  const auto begin = std::chrono::steady_clock::now();
-  const auto next = diagnosis::next_experiment(cell, first, !recording.temperature_c.empty());
-  up.plan_wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-  if (!next) return up;
-  up.profile = next->profile;
-  up.expected_gain = next->gain;
-  up.duration_s = next->duration_s;
-  up.sets = sets_of(diagnosis::diagnose(cell, {}, {recording, carried_out(c, cell, *next)}));
-
-  if (c.answer.ids.size() != 1) return up;
-  const std::string& truth = c.answer.ids.front();
-  const std::vector<std::string> confused = sets_of(first).front();
-  bool named = false, rival = false;
-  for (const auto& set : up.sets) {
-    named = named || contains(set, truth);
-    for (const std::string& id : set) rival = rival || (id != truth && contains(confused, id));
+  std::vector<diagnosis::PreparedRecording> records = {recording};
+  std::vector<std::string> profiles;
+  diagnosis::Diagnosis d = first;
+  while (diagnosis::names(d.verdict) && has_rivals(sets_of(d)) && up.rounds.size() < most_rounds) {
+    Round round;
+    const auto begin = std::chrono::steady_clock::now();
+    const auto next = diagnosis::next_experiment(cell, d, !recording.temperature_c.empty(), profiles);
+    round.plan_wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    up.nothing_more = !next;
+    if (!next) break;
+    round.profile = next->profile;
+    round.expected_gain = next->gain;
+    round.duration_s = next->duration_s;
+    profiles.push_back(next->profile);
+    records.push_back(carried_out(c, cell, *next));
+    d = diagnosis::diagnose(cell, {}, records);
+    round.verdict = d.verdict;
+    round.sets = sets_of(d);
+    up.rounds.push_back(std::move(round));
   }
-  up.separated = named && !rival;
+
+  if (up.rounds.empty()) return up;
+  up.decided_at_once = decided(up.rounds.front());
+  up.right_at_once = right(up.rounds.front(), c.answer);
+  up.decided = decided(up.rounds.back());
+  up.right = right(up.rounds.back(), c.answer);
+  if (c.answer.ids.size() == 1)
+    up.separated = separated(up.rounds.front(), c.answer.ids.front(), sets_of(first).front());
   return up;
 }
 

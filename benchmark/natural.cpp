@@ -8,9 +8,11 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -19,6 +21,7 @@
 
 #include "benchmark/natural_judge.hpp"
 #include "benchmark/natural_truth.hpp"
+#include "benchmark/not_run.hpp"
 #include "benchmark/real_cell.hpp"
 #include "benchmark/run_program.hpp"
 #include "diagnosis/diagnose.hpp"
@@ -33,6 +36,7 @@ using bms::benchmark::Answer;
 using bms::benchmark::Given;
 using bms::benchmark::Judgement;
 using bms::benchmark::NaturalCase;
+using bms::benchmark::NotRun;
 using bms::benchmark::Outcome;
 using bms::benchmark::Prepared;
 using bms::benchmark::RealSet;
@@ -183,10 +187,36 @@ void print_counts(const std::vector<Result>& results) {
   }
 }
 
-std::string json_of(const std::vector<Result>& results) {
+nlohmann::ordered_json counts_of(const std::vector<Result>& results, const std::function<bool(const Given&)>& which) {
+  std::map<Outcome, std::size_t> count;
+  std::size_t cases = 0;
+  for (const Result& r : results) {
+    if (!which(r.given)) continue;
+    ++cases;
+    ++count[r.judgement.outcome];
+  }
+  return {{"cases", cases},
+          {"right", count[Outcome::right]},
+          {"size_off", count[Outcome::size_off]},
+          {"undecided", count[Outcome::undecided]},
+          {"wrong", count[Outcome::wrong]}};
+}
+
+/// Each case counts once, by the answer to its recording alone. The groups count diagnoses.
+nlohmann::ordered_json json_of_counts(const std::vector<Result>& results) {
+  const auto alone = [](const Given& g) { return !g.references && !g.second && !g.before; };
+  nlohmann::ordered_json json = counts_of(results, alone);
+  json["alone"] = counts_of(results, alone);
+  json["with_recordings"] = counts_of(results, [](const Given& g) { return !g.references && (g.second || g.before); });
+  json["with_references"] = counts_of(results, [](const Given& g) { return g.references; });
+  return json;
+}
+
+std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Result& r : results)
     list.push_back({{"case", r.of.name},
+                    {"kind", "natural"},
                     {"set_aside", r.of.set_aside},
                     {"given", name_of(r.given)},
                     {"truth", truth_text(r)},
@@ -196,35 +226,68 @@ std::string json_of(const std::vector<Result>& results) {
                     {"why", r.judgement.why},
                     {"worse_with_more_data", r.worse},
                     {"wall_s", r.wall_s}});
-  return list.dump(1) + "\n";
+  const nlohmann::ordered_json json = {{"natural", json_of_counts(results)},
+                                       {"skipped", not_run.skipped},
+                                       {"without_cell_file", not_run.without_cell_file},
+                                       {"results", list}};
+  return json.dump(1) + "\n";
 }
 
-void run_all(const Options& o) {
+/// The cases that are to be run, each with its set.
+struct Work {
+  std::vector<std::pair<NaturalCase, RealSet>> cases;
+  NotRun not_run;
+};
+
+std::vector<std::string> files_of(const NaturalCase& c, const RealSet& set) {
+  std::vector<std::string> files = files_of(set);
+  for (const std::string& name : {c.recording, c.second, c.before, c.cycles}) {
+    if (!name.empty()) files.push_back(name);
+  }
+  return files;
+}
+
+Work read_work(const Options& o) {
   const auto table = [](const std::string& path) {
     return bms::files::TomlTable::parse(bms::files::read_file(path), path, "a list of recordings");
   };
   bms::files::TomlTable shared = table(o.sets), own = table(o.list);
   std::vector<RealSet> sets = bms::benchmark::read_sets(shared);
   for (RealSet& s : bms::benchmark::read_sets(own)) sets.push_back(std::move(s));
-  const std::vector<NaturalCase> cases = read_cases(own);
+  std::vector<NaturalCase> cases = read_cases(own);
   own.finish();
-  std::map<std::string, std::optional<Prepared>> prepared_sets;
-  std::vector<Result> results;
-  fmt::print("| case | given | truly there | said | size | judged | s |\n|---|---|---|---|---|---|---|\n");
-  for (const NaturalCase& c : cases) {
+  Work work;
+  bms::benchmark::Present present(o.data);
+  for (NaturalCase& c : cases) {
     if (c.name.find(o.only) == std::string::npos || (!o.all && c.set_aside != o.set_aside)) continue;
     const auto set = std::find_if(sets.begin(), sets.end(), [&](const RealSet& s) { return s.name == c.set; });
     if (set == sets.end()) throw bms::files::BadInput(o.list, 1, "no set '" + c.set + "', expected one of the lists");
+    if (present.has(c.name, files_of(c, *set))) work.cases.emplace_back(std::move(c), *set);
+  }
+  work.not_run.skipped = present.skipped();
+  fmt::print(stderr, "{}", present.skipped_text("cases"));
+  return work;
+}
+
+void run_all(const Options& o) {
+  Work work = read_work(o);
+  std::map<std::string, std::optional<Prepared>> prepared_sets;
+  std::vector<Result> results;
+  std::size_t at = 0;
+  fmt::print("| case | given | truly there | said | size | judged | s |\n|---|---|---|---|---|---|---|\n");
+  for (const auto& [c, set] : work.cases) {
+    fmt::print(stderr, "case {} of {}: {}\n", ++at, work.cases.size(), c.name);
     auto& prepared = prepared_sets[c.set];
     try {
-      if (!prepared) prepared = prepare(o.data, *set, true);
+      if (!prepared) prepared = prepare(o.data, set, true);
     } catch (const std::runtime_error& error) {  // no cell file, no case
       fmt::print("| {} | - | - | no cell file: {} | | | |\n", c.name, error.what());
+      ++work.not_run.without_cell_file;
       continue;
     }
     const std::size_t first = results.size();
     for (const Given& given : variants(o, c)) {
-      Result r = run(o, c, *set, prepared->cell, given);
+      Result r = run(o, c, set, prepared->cell, given);
       for (std::size_t k = first; k < results.size(); ++k)
         r.worse |= has_fewer(results[k].given, given) && made_worse(results[k].judgement, r.judgement);
       print_line(r);
@@ -232,7 +295,7 @@ void run_all(const Options& o) {
     }
   }
   print_counts(results);
-  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results));
+  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results, work.not_run));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
@@ -70,6 +71,36 @@ std::vector<RealSet> read_sets(files::TomlTable& list) {
     sets.push_back(std::move(s));
   }
   return sets;
+}
+
+std::vector<std::string> files_of(const RealSet& set) {
+  std::vector<std::string> files = set.calibration;
+  files.insert(files.end(), set.healthy.begin(), set.healthy.end());
+  files.insert(files.end(), set.ocv.begin(), set.ocv.end());
+  if (!set.test.empty()) files.push_back(set.test);
+  return files;
+}
+
+Present::Present(std::string data_folder) : folder_(std::move(data_folder)) {
+  if (!std::filesystem::is_directory(folder_))
+    throw files::BadInput(folder_, 1, "no such folder, expected one with recordings");
+}
+
+bool Present::has(const std::string& entry, const std::vector<std::string>& files) {
+  const auto missing = std::find_if(files.begin(), files.end(), [&](const std::string& name) {
+    return !std::filesystem::exists(std::filesystem::path(folder_) / name);
+  });
+  if (missing == files.end()) return true;
+  if (skipped_.empty()) first_missing_ = *missing;
+  if (std::find(skipped_.begin(), skipped_.end(), entry) == skipped_.end()) skipped_.push_back(entry);
+  return false;
+}
+
+std::string Present::skipped_text(const std::string& what) const {
+  if (skipped_.empty()) return "";
+  return files::printable(fmt::format("skipped {} {}: recordings are not in {} (first '{}': {})", skipped_.size(), what,
+                                      folder_, skipped_.front(), first_missing_)) +
+         "\n";
 }
 
 Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_healthy) {

@@ -1,6 +1,7 @@
 // Real recordings of a list, and the cell file that is identified from the healthy ones among them.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,25 @@ struct RealSet {
 
 /// All [[set]] of the list.
 std::vector<RealSet> read_sets(files::TomlTable& list);
+
+/// Files that a set needs.
+std::vector<std::string> files_of(const RealSet& set);
+
+/// Which entries of a list have their recordings in the folder of the data. A list may name more than a folder has.
+class Present {
+ public:
+  /// Throws BadInput if there is no such folder.
+  explicit Present(std::string data_folder);
+  /// Returns true if all files are there. Otherwise counts and remembers the entry, once per name.
+  bool has(const std::string& entry, const std::vector<std::string>& files);
+  std::size_t skipped() const { return skipped_.size(); }
+  /// What was skipped, in one line with its end; empty: nothing. what: "sets".
+  std::string skipped_text(const std::string& what) const;
+
+ private:
+  std::string folder_, first_missing_;
+  std::vector<std::string> skipped_;
+};
 
 /// The identified cell and the recording that is left out.
 struct Prepared {

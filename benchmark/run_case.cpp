@@ -107,6 +107,7 @@ Outcome run_case(const truth::Case& c) {
   o.figures = figures_of(d);
   if (d.law) o.law = d.law->law;
   o.has_term = d.law && d.law->cell;
+  o.isolability = d.isolability;
 
   std::vector<double> holdout_v;
   if (!c.holdout.time_s.empty()) {

@@ -24,6 +24,7 @@ struct Outcome {
   double holdout_before_v = 0, holdout_after_v = 0, holdout_floor_v = 0;
   std::string law;        ///< that an unknown cause acts on
   bool has_term = false;  ///< for that law, learned from the recording
+  std::optional<diagnosis::Isolability> isolability;
   double wall_s = 0;
   std::optional<FollowUp> next;  ///< of an ambiguous diagnosis
   std::string figures;           ///< figures behind the decision, for the printed line

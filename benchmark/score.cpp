@@ -5,6 +5,7 @@
 #include <cmath>
 #include <utility>
 
+#include "benchmark/calibration_error.hpp"
 #include "benchmark/cause_ids.hpp"
 #include "measurement/statistics.hpp"
 
@@ -33,32 +34,6 @@ bool finds(const Outcome& o, std::size_t k, const std::string& id) {
   return contains(o.sets[k], id) || class_of(o.found[k]) == class_of(id);
 }
 
-/// Expected calibration error: findings in five bins of their probability.
-class Calibration {
- public:
-  void add(double probability, bool right) {
-    Bin& b = bins_[static_cast<std::size_t>(std::min(probability * 5, 4.0))];
-    b.probability += probability;
-    b.right += right ? 1 : 0;
-    ++count_;
-  }
-  std::size_t count() const { return count_; }
-  double error() const {
-    double error = 0;
-    for (const Bin& b : bins_) {
-      if (count_ > 0) error += std::abs(b.probability - b.right) / static_cast<double>(count_);
-    }
-    return error;
-  }
-
- private:
-  struct Bin {
-    double probability = 0, right = 0;
-  };
-  std::array<Bin, 5> bins_{};
-  std::size_t count_ = 0;
-};
-
 void count_holdout(const Outcome& o, Share& share) {
   if (o.holdout_before_v <= 0 || !o.answer.repeats_in_holdout) return;
   const double floor = o.holdout_floor_v;
@@ -82,6 +57,29 @@ std::size_t count_findings(const Outcome& o, Score& s) {
   return size;
 }
 
+/// Of a named effect: whether each cause that could be confused with it is.
+void count_isolability(const Outcome& o, Score& s) {
+  if (!named(o) || !o.isolability) return;
+  const std::string& truth = o.answer.ids.front();
+  const diagnosis::Isolability& i = *o.isolability;
+  const auto of_truth = std::find_if(i.causes.begin(), i.causes.end(),
+                                     [&](const auto& c) { return model::catalogue[c.mechanism].id == truth; });
+  if (of_truth == i.causes.end()) return;
+  const auto a = static_cast<std::size_t>(of_truth - i.causes.begin());
+  std::vector<std::string> together;  // named with it, or in its place
+  for (const auto& set : o.sets) {
+    if (contains(set, truth) || !contains(o.found, truth)) together.insert(together.end(), set.begin(), set.end());
+  }
+  for (std::size_t b = 0; b < i.causes.size(); ++b) {
+    const bool confused = contains(together, std::string(model::catalogue[i.causes[b].mechanism].id));
+    if (b == a) continue;
+    if (i.separable[a][b])
+      s.distinguished.count(!confused);
+    else
+      s.confused.count(confused);
+  }
+}
+
 void count_pair(const Outcome& o, Score& s) {
   const std::vector<std::string>& ids = o.answer.ids;
   std::size_t right = 0;
@@ -97,6 +95,16 @@ void count_pair(const Outcome& o, Score& s) {
   }
   s.pair_both.count(named(o) && right == 2);
   s.pair_one_none_wrong.count(named(o) && right >= 1 && !wrong);
+}
+
+/// Experiments that an ambiguous diagnosis has led to. Returns their number.
+std::size_t count_experiments(const FollowUp& up, Score& s) {
+  s.decided_at_once.count(up.decided_at_once);
+  s.decided.count(up.decided);
+  s.nothing_more.count(up.nothing_more);
+  if (up.decided_at_once) s.right_at_once.count(up.right_at_once);
+  if (up.decided) s.right.count(up.right);
+  return up.rounds.size();
 }
 
 }  // namespace
@@ -124,8 +132,8 @@ bool no_alarm(const Outcome& o) { return o.verdict == Verdict::no_mismatch || o.
 Score score(const std::vector<Outcome>& outcomes) {
   Score s;
   std::vector<double> overlaps;
-  double set_sizes = 0, wall_s = 0;
-  Calibration calibration;
+  double set_sizes = 0, wall_s = 0, experiments = 0;
+  CalibrationError calibration;
   for (const Outcome& o : outcomes) {
     wall_s += o.wall_s;
     const CaseKind kind = o.answer.kind;
@@ -139,10 +147,12 @@ Score score(const std::vector<Outcome>& outcomes) {
       if (alarm) {
         set_sizes += static_cast<double>(count_findings(o, s));
         overlaps.push_back(o.overlap);
+        count_isolability(o, s);
       }
       count_holdout(o, s.holdout);
     }
     if (kind == CaseKind::single && o.next) s.separated.count(o.next->separated);
+    if (o.next) experiments += static_cast<double>(count_experiments(*o.next, s));
     if (kind == CaseKind::pair && o.answer.ids.size() == 2) count_pair(o, s);
     if (named(o) && (kind == CaseKind::single || kind == CaseKind::null || kind == CaseKind::outside))
       calibration.add(o.probability, kind == CaseKind::single && o.found.front() == o.answer.ids.front());
@@ -151,6 +161,7 @@ Score score(const std::vector<Outcome>& outcomes) {
   s.calibration_error = calibration.error();
   if (!overlaps.empty()) s.median_overlap = measurement::upper_median(overlaps);
   s.mean_set_size = s.in_set.of > 0 ? set_sizes / static_cast<double>(s.in_set.of) : 0;
+  s.mean_experiments = s.decided.of > 0 ? experiments / static_cast<double>(s.decided.of) : 0;
   s.mean_wall_s = outcomes.empty() ? 0 : wall_s / static_cast<double>(outcomes.size());
   return s;
 }

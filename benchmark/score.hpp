@@ -27,6 +27,12 @@ Interval wilson(const Share& share);
 struct Score {
   Share false_alarms, detected, detected_all, first, first_class, in_set, pair_both, pair_one_none_wrong,
       outside_unknown, data_fault, holdout, separated;
+  Share distinguished;  ///< causes that the recording can distinguish from the true one (Isolability): not confused
+                        ///< with it
+  Share confused;       ///< the others: confused
+  /// Of the ambiguous diagnoses, whatever the kind of the case: after one experiment and after all that were proposed.
+  Share decided_at_once, right_at_once, decided, right, nothing_more;
+  double mean_experiments = 0;
   std::size_t named = 0;  ///< cases of the calibration error
   double mean_set_size = 0, median_overlap = 0, calibration_error = 0, mean_wall_s = 0;
 };

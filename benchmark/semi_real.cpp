@@ -20,8 +20,7 @@
 #include "benchmark/real_cell.hpp"
 #include "benchmark/run_program.hpp"
 #include "benchmark/semi_real_tables.hpp"
-#include "diagnosis/predicted_band.hpp"
-#include "diagnosis/prepare.hpp"
+#include "diagnosis/prediction_interval.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
 #include "measurement/statistics.hpp"
@@ -46,35 +45,18 @@ struct Options {
 };
 
 /// The band of the prediction on the recording that is left out.
-struct Band {
-  double within = 0;                     ///< share of the readings within 1.96 standard deviations
-  double error_v = 0, half_width_v = 0;  ///< RMS
-};
-
-Band band_of(const RealSet& set, const Prepared& p) {
+bms::diagnosis::Coverage band_of(const RealSet& set, const Prepared& p) {
   const bms::diagnosis::PreparedRecording record =
       bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
-  const bms::diagnosis::LikelihoodModel likelihood =
-      bms::diagnosis::likelihood_model_of(p.cell.parameters, p.cell.mechanisms, {record});
-  const std::vector<double> sigma_v = bms::diagnosis::predicted_sigma_v(likelihood, 0, p.cell.healthy),
-                            file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
-  std::size_t within = 0, of = 0;
-  bms::measurement::MeanSquare error, band;
-  for (std::size_t k = 0; k < record.size(); ++k) {
-    const double e = record.voltage_v[k] - file_v[k];
-    if (!std::isfinite(e)) continue;
-    constexpr double two_sided_95 = 1.96;
-    within += std::abs(e) <= two_sided_95 * sigma_v[k] ? 1 : 0;
-    ++of;
-    error.add(e);
-    band.add(two_sided_95 * sigma_v[k]);
-  }
-  return {static_cast<double>(within) / static_cast<double>(std::max<std::size_t>(of, 1)), error.root(), band.root()};
+  return bms::diagnosis::prediction_interval(p.cell.parameters, p.cell.mechanisms, record,
+                                             bms::diagnosis::predict(p.cell.parameters, p.cell.mechanisms, record),
+                                             p.cell.healthy)
+      .coverage;
 }
 
-void print_band(const RealSet& set, const Band& band) {
-  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name, 100 * band.within,
-             1e3 * band.error_v, 1e3 * band.half_width_v);
+void print_band(const RealSet& set, const bms::diagnosis::Coverage& band) {
+  fmt::print("| {} | {} | {:.1f} % | {:.1f} mV | {:.1f} mV |\n", set.cell, set.name, 100 * band.share(),
+             1e3 * band.error_v(), 1e3 * band.half_width_v());
   std::fflush(stdout);
 }
 
@@ -142,9 +124,11 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
                            f.setting.deviation[0]);
     for (const std::size_t e : f.equivalent_to) r.found += "~" + std::string(bms::model::catalogue[e].id);
   }
-  if (fault == nullptr || d.findings.empty() || !bms::diagnosis::names(d.verdict)) return r;
+  if (d.findings.empty() || !bms::diagnosis::names(d.verdict)) return r;
   const Finding& first = d.findings.front();
-  r.first_right = bms::model::catalogue[first.setting.index].id == fault->id;
+  r.probability = first.probability;
+  if (fault == nullptr) return r;
+  r.first_right = r.is_the_fault = bms::model::catalogue[first.setting.index].id == fault->id;
   for (const std::size_t e : first.equivalent_to) r.first_right |= bms::model::catalogue[e].id == fault->id;
   r.sigmas = sigmas_of(first, *fault, size, p.cell.parameters.capacity_ah);
   return r;
@@ -163,8 +147,21 @@ std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, doubl
   return sizes;
 }
 
+/// The sets of the list that are asked for and whose recordings are there.
+std::vector<RealSet> sets_of(const Options& o, bms::benchmark::Present& present) {
+  bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
+  std::vector<RealSet> sets = bms::benchmark::read_sets(list);
+  list.finish();
+  std::erase_if(sets, [&](const RealSet& s) {
+    return s.name.find(o.only) == std::string::npos || !present.has(s.name, files_of(s));
+  });
+  fmt::print(stderr, "{}", present.skipped_text("sets"));
+  return sets;
+}
+
 void run(const Options& o) {
   std::vector<Result> results;
+  bms::benchmark::NotRun not_run;
   const auto add = [&](Result r) {
     fmt::print("{}", line_of(r));
     std::fflush(stdout);
@@ -175,27 +172,28 @@ void run(const Options& o) {
   };
   if (o.bands_only)
     fmt::print("| cell | set | within the 95 % band | error, RMS | band, RMS |\n|---|---|---|---|---|\n");
-  bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
-  const std::vector<RealSet> sets = bms::benchmark::read_sets(list);
-  list.finish();
+  bms::benchmark::Present present(o.data);
+  const std::vector<RealSet> sets = sets_of(o, present);
+  not_run.skipped = present.skipped();
   for (const RealSet& set : sets) {
-    if (set.name.find(o.only) == std::string::npos) continue;
+    fmt::print(stderr, "set {} of {}: {}\n", &set - sets.data() + 1, sets.size(), set.name);
     Prepared p;
     try {
       p = prepare(o.data, set, !o.without_healthy);
     } catch (const std::runtime_error& error) {  // no cell file, no case
       fmt::print("{:40} no cell file: {}\n", set.name, error.what());
+      ++not_run.without_cell_file;
       continue;
     }
-    const Band band = band_of(set, p);
+    const bms::diagnosis::Coverage band = band_of(set, p);
     if (o.bands_only) {
       print_band(set, band);
       continue;
     }
     std::map<std::string, double> limits;
     Result null = diagnose(o, set, p, p.test, nullptr, 0, limits);
-    null.band_within = band.within;
-    null.band_over_error = band.half_width_v / band.error_v;
+    null.band_within = band.share();
+    null.band_over_error = band.half_width_v() / band.error_v();
     add(std::move(null));
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
@@ -209,7 +207,7 @@ void run(const Options& o) {
   }
   if (o.bands_only) return;
   fmt::print("{}", table_of(results));
-  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results));
+  if (!o.json.empty()) bms::files::write_file(o.json, json_of(results, not_run));
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "benchmark/calibration_error.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::benchmark {
@@ -61,6 +62,31 @@ std::string bands_of(const std::vector<Result>& results, const Which& counts) {
                      measurement::median(widths));
 }
 
+/// Of the first causes that are named, of nulls as well: how many are the fault that was put in, and whether their
+/// probabilities say so.
+nlohmann::ordered_json json_of_probabilities(const std::vector<Result>& results, const Which& counts) {
+  CalibrationError error;
+  double sum = 0;
+  std::size_t right = 0;
+  for (const Result& r : results) {
+    if (!counts(r) || !r.probability) continue;
+    error.add(*r.probability, r.is_the_fault);
+    sum += *r.probability;
+    right += r.is_the_fault ? 1 : 0;
+  }
+  return {{"named", error.count()},
+          {"right", right},
+          {"mean_probability", error.count() > 0 ? sum / static_cast<double>(error.count()) : 0},
+          {"calibration_error", error.error()}};
+}
+
+std::string probabilities_of(const std::vector<Result>& results, const Which& counts) {
+  const nlohmann::ordered_json j = json_of_probabilities(results, counts);
+  if (j["named"] == 0) return "-";
+  return fmt::format("{} of {}; {:.2f}; {:.2f}", j["right"].get<int>(), j["named"].get<int>(),
+                     j["mean_probability"].get<double>(), j["calibration_error"].get<double>());
+}
+
 /// The same figures for each cell. Faults are those of twice their detection limit and above.
 std::string by_cell(const std::vector<Result>& results) {
   std::string text =
@@ -90,6 +116,52 @@ std::string by_cell(const std::vector<Result>& results) {
                         bands_of(results, null));
   }
   return text;
+}
+
+std::size_t count(const std::vector<Result>& results, const Which& which) {
+  return static_cast<std::size_t>(std::count_if(results.begin(), results.end(), which));
+}
+
+nlohmann::ordered_json json_of_nulls(const std::vector<Result>& results) {
+  const auto verdict = [&](std::string_view what) {
+    return count(results, [&](const Result& r) { return r.fault.empty() && r.verdict == what; });
+  };
+  double hours = 0;
+  for (const Result& r : results) hours += r.fault.empty() ? r.hours : 0;
+  return {{"cases", count(results, [](const Result& r) { return r.fault.empty(); })},
+          {"false", count(results, [](const Result& r) { return r.fault.empty() && r.named; })},
+          {"hours", hours},
+          {"unknown", verdict("UNKNOWN")},
+          {"not_testable", verdict("NOT_TESTABLE")},
+          {"data_fault", verdict("DATA_FAULT")}};
+}
+
+/// Counts of the faults of these sizes.
+nlohmann::ordered_json json_of_sizes(const std::vector<Result>& results, bool within_bounds, double low, double high) {
+  const auto faults = [&](const Which& yes) {
+    return count(results, [&](const Result& r) {
+      return !r.fault.empty() && r.over_limit && r.within_bounds == within_bounds && *r.over_limit >= low &&
+             *r.over_limit < high && yes(r);
+    });
+  };
+  return {{"cases", faults([](const Result&) { return true; })},
+          {"detected", faults([](const Result& r) { return r.detected; })},
+          {"first_right", faults([](const Result& r) { return r.first_right; })},
+          {"another_first", faults([](const Result& r) { return r.named && !r.first_right; })},
+          {"size_compared", faults([](const Result& r) { return r.sigmas.has_value(); })},
+          {"size_within_2_sigma", faults([](const Result& r) { return r.sigmas && std::abs(*r.sigmas) <= 2; })}};
+}
+
+nlohmann::ordered_json json_of_faults(const std::vector<Result>& results) {
+  const double no_end = std::numeric_limits<double>::infinity();
+  nlohmann::ordered_json json = json_of_sizes(results, true, plainly_above, no_end);
+  json["half_limit"] = json_of_sizes(results, true, 0, plainly_below);
+  json["beyond_bounds"] = json_of_sizes(results, false, plainly_above, no_end);
+  json["without_limit"] = {{"cases", count(results, [](const Result& r) { return !r.fault.empty() && !r.over_limit; })},
+                           {"another_first", count(results, [](const Result& r) {
+                              return !r.fault.empty() && !r.over_limit && r.named && !r.first_right;
+                            })}};
+  return json;
 }
 
 }  // namespace
@@ -162,7 +234,10 @@ std::string table_of(const std::vector<Result>& results) {
   row(
       "size within two of its standard deviations", [](const Result& r) { return r.sigmas.has_value(); },
       [](const Result& r) { return std::abs(*r.sigmas) <= 2; });
-  text += "| readings within the 95 % band; its half width over the error |";
+  text += "| first cause is the fault put in; mean of its probability; expected calibration error |";
+  for (const bool held_out : {false, true})
+    text += " " + probabilities_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
+  text += "\n| readings within the 95 % band; its half width over the error |";
   for (const bool held_out : {false, true})
     text += " " + bands_of(results, [&](const Result& r) { return r.held_out == held_out; }) + " |";
   text += "\n" + by_cell(results) + by_size(results);
@@ -171,11 +246,12 @@ std::string table_of(const std::vector<Result>& results) {
   return text + fmt::format("\nSlowest diagnosis: {:.0f} s.\n", slowest_s);
 }
 
-std::string json_of(const std::vector<Result>& results) {
+std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const Result& r : results) {
     list.push_back({{"set", r.set},
                     {"cell", r.cell},
+                    {"kind", r.fault.empty() ? "null" : "fault"},
                     {"fault", r.fault},
                     {"size", r.size},
                     {"held_out", r.held_out},
@@ -184,15 +260,27 @@ std::string json_of(const std::vector<Result>& results) {
                     {"withheld", r.withheld},
                     {"over_limit", or_null(r.over_limit)},
                     {"within_bounds", r.within_bounds},
+                    {"named", r.named},
+                    {"detected", r.detected},
                     {"first_right", r.first_right},
+                    {"probability", or_null(r.probability)},
+                    {"is_the_fault", r.is_the_fault},
                     {"sigmas", or_null(r.sigmas)},
                     {"band_within", or_null(r.band_within)},
                     {"band_over_error", or_null(r.band_over_error)},
                     {"error_v", r.error_v},
                     {"remaining_v", r.remaining_v},
+                    {"hours", r.hours},
                     {"wall_s", r.wall_s}});
   }
-  return list.dump(1) + "\n";
+  const nlohmann::ordered_json json = {
+      {"nulls", json_of_nulls(results)},
+      {"faults", json_of_faults(results)},
+      {"probabilities", json_of_probabilities(results, [](const Result&) { return true; })},
+      {"skipped", not_run.skipped},
+      {"without_cell_file", not_run.without_cell_file},
+      {"results", list}};
+  return json.dump(1) + "\n";
 }
 
 std::string line_of(const SemiRealResult& r) {

@@ -5,6 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "benchmark/not_run.hpp"
+
 namespace bms::benchmark {
 
 /// One diagnosis.
@@ -15,6 +17,9 @@ struct SemiRealResult {
   std::string verdict, found, withheld;
   bool within_bounds = true;  ///< a real instrument or contact can be that wrong
   bool detected = false, first_right = false, named = false;
+  /// Of a finding: its probability, and whether it is the fault that was put in.
+  std::optional<double> probability = std::nullopt;
+  bool is_the_fault = false;
   std::optional<double> over_limit;       ///< size over the stated detection limit
   std::optional<double> sigmas;           ///< of the found size from the true one
   std::optional<double> band_within;      ///< of a null: share of the readings within the 95 % band of the prediction
@@ -28,6 +33,9 @@ std::string line_of(const SemiRealResult& r);
 std::string by_size(const std::vector<SemiRealResult>& results);
 /// Figures of all development and held-out cells, and of each cell.
 std::string table_of(const std::vector<SemiRealResult>& results);
-std::string json_of(const std::vector<SemiRealResult>& results);
+
+/// Counts of nulls and faults, and every result. Faults are those of twice the stated limit and above, within the
+/// bounds of a real instrument.
+std::string json_of(const std::vector<SemiRealResult>& results, const NotRun& not_run);
 
 }  // namespace bms::benchmark

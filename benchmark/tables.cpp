@@ -47,6 +47,18 @@ constexpr std::array rows = {
         [](const Score& s) { return text(s.holdout); }},
     Row{"ambiguous ones separated by the experiment asked for", ">= 80 %",
         [](const Score& s) { return s.separated.of > 0 ? text(s.separated) : "-"; }},
+    Row{"ambiguous ones decided after one experiment; of these right", "",
+        [](const Score& s) { return s.decided.of > 0 ? text(s.decided_at_once) + "; " + text(s.right_at_once) : "-"; }},
+    Row{"after all that were asked for; of these right", "",
+        [](const Score& s) { return s.decided.of > 0 ? text(s.decided) + "; " + text(s.right) : "-"; }},
+    Row{"experiments a case; nothing more can be learned", "",
+        [](const Score& s) {
+          return s.decided.of > 0 ? fmt::format("{:.1f}; {}", s.mean_experiments, text(s.nothing_more)) : "-";
+        }},
+    Row{"causes that the recording can distinguish from the true one: not confused", ">= 95 %",
+        [](const Score& s) { return s.distinguished.of > 0 ? text(s.distinguished) : "-"; }},
+    Row{"causes that it cannot: confused", "",
+        [](const Score& s) { return s.confused.of > 0 ? text(s.confused) : "-"; }},
     Row{"located in time: intersection over union, median", ">= 0.6",
         [](const Score& s) { return s.detected.hits > 0 ? fmt::format("{:.2f}", s.median_overlap) : "-"; }},
     Row{"expected calibration error of the probabilities", "<= 0.07",

@@ -86,25 +86,8 @@ bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<
   return !(away >= chi_square_of_own_sigmas(strengths.size()));  // true for NaN
 }
 
-bool is_implausible(const HypothesisFit& f, std::size_t mechanism) {
-  constexpr std::size_t capacity = model::mechanism_index_of<model::CapacityChange>;
-  const auto growth = [&](std::size_t of) {
-    const MechanismSetting* s = f.hypothesis.find(of);
-    return s == nullptr ? 0 : s->value[0];
-  };
-  if (mechanism == model::mechanism_index_of<model::OcvShape>) {
-    const auto& slide = f.hypothesis.find(mechanism)->value;
-    return (slide[0] - slide[1]) / credible_limits.slides_apart_soc - growth(capacity) > credible_limits.stages_closer;
-  }
-  if (mechanism != capacity) return false;
-  return growth(capacity) > credible_limits.capacity_lost_alone &&
-         growth(model::mechanism_index_of<model::ResistanceGrowth>) < credible_limits.resistance_grown &&
-         growth(model::mechanism_index_of<model::PolarisationGrowth>) < credible_limits.resistance_grown;
-}
-
-bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step_s) {
-  return mechanism == model::mechanism_index_of<model::ChannelSkew> &&
-         std::abs(f.hypothesis.find(mechanism)->value[0]) < thresholds.noise.edge_jitter * step_s;
+bool is_implausible(const HypothesisFit& f, std::size_t mechanism, const RecordingFacts& facts) {
+  return knowledge_of(mechanism).is_implausible(*f.hypothesis.find(mechanism), f.hypothesis.settings, facts);
 }
 
 bool is_at_the_end(const HypothesisFit& f, std::size_t mechanism, const std::vector<PreparedRecording>& records) {

@@ -18,13 +18,8 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::
 /// `certain` mechanisms fixed: of two that share an effect neither is known alone. One at a bound does not count.
 bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<std::size_t>& certain);
 
-/// Returns true if a cell does not age so: much of its capacity is gone, its resistance is as it was; or the stages of
-/// its OCV lie closer together, its capacity is as it was.
-bool is_implausible(const HypothesisFit& f, std::size_t mechanism);
-
-/// Returns true for a skew of less than what the noise model grants each reading next to an edge of the current
-/// (thresholds.noise.edge_jitter). step_s: between rows.
-bool is_within_jitter(const HypothesisFit& f, std::size_t mechanism, double step_s);
+/// Returns true if no cell or instrument is so, by what is known of the mechanism.
+bool is_implausible(const HypothesisFit& f, std::size_t mechanism, const RecordingFacts& facts);
 
 /// Returns true for a contact that is open only at the end of records, in the last twelfth of each
 /// (thresholds.decision. end_share): bursts that begin there, or a change of a single record.

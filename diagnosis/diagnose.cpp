@@ -10,6 +10,7 @@
 #include "diagnosis/detection_limits.hpp"
 #include "diagnosis/effect_gain.hpp"
 #include "diagnosis/findings.hpp"
+#include "diagnosis/isolability.hpp"
 #include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/locate.hpp"
 #include "diagnosis/one_by_one.hpp"
@@ -241,6 +242,8 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
     if (is_read_in_leaps(likelihood.records())) adequacy.unknown = true;  // which no cause makes
   }
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
+  if (!options.learns && !search.stopped())
+    d.isolability = isolability_of(likelihood, search.nominal_noise(), d.limits);
   d.unknown_gain = unknown_gain(adequacy.residual);
   if (options.learns && adequacy.found)
     d.unknown_gain = std::max(d.unknown_gain, unknown_gain_of(likelihood, search.nominal_noise(), control));

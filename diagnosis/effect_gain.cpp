@@ -16,6 +16,8 @@ EffectGain::EffectGain(const LikelihoodModel& likelihood, const NoiseModel& nomi
       control_(control),
       residual_(likelihood.raw_residual(control.hypothesis, control.calibration)),
       by_base_(likelihood.raw_calibration_derivatives(control.hypothesis, control.calibration)) {
+  for (std::size_t r = 0; r < likelihood.records().size(); ++r)
+    control_v_.push_back(likelihood.voltage(control.hypothesis, control.calibration, r));
   likelihood_.set_noise(nominal);
   likelihood_.likeliest_noise(residual_, nominal_, cost_);
   cost_ += control_.calibration.squaredNorm();
@@ -25,9 +27,8 @@ Columns EffectGain::effect_of(const Hypothesis& changed) const {
   Columns effect = Columns::Zero(static_cast<Eigen::Index>(likelihood_.samples()), 1);
   Eigen::Index row = 0;
   for (std::size_t r = 0; r < likelihood_.records().size(); ++r) {
-    const std::vector<double> without_v = likelihood_.voltage(control_.hypothesis, control_.calibration, r),
-                              with_v = likelihood_.voltage(changed, control_.calibration, r);
-    for (std::size_t k = 0; k < with_v.size(); ++k) effect(row++, 0) = with_v[k] - without_v[k];
+    const std::vector<double> with_v = likelihood_.voltage(changed, control_.calibration, r);
+    for (std::size_t k = 0; k < with_v.size(); ++k) effect(row++, 0) = with_v[k] - control_v_[r][k];
   }
   return effect;
 }

@@ -24,8 +24,9 @@ class EffectGain {
   LikelihoodModel likelihood_;
   NoiseModel nominal_;
   HypothesisFit control_;
-  Columns residual_, by_base_;  ///< of the control; not white
-  double cost_ = 0;             ///< of the control
+  std::vector<std::vector<double>> control_v_;  ///< by record
+  Columns residual_, by_base_;                  ///< of the control; not white
+  double cost_ = 0;                             ///< of the control
 };
 
 }  // namespace bms::diagnosis

@@ -13,7 +13,7 @@ namespace {
 
 using measurement::HealthyRange;
 
-constexpr const Thresholds::Healthy& coverage_limits = thresholds.healthy;
+constexpr const HealthyThresholds& coverage_limits = thresholds.healthy;
 
 /// One axis, and by how much a row may leave it.
 struct Dimension {

@@ -14,7 +14,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Healthy& healthy_limits = thresholds.healthy;
+constexpr const HealthyThresholds& healthy_limits = thresholds.healthy;
 
 /// P(T > t) of Student's distribution.
 double student_tail(double t, double freedom) {

@@ -128,8 +128,17 @@ Eigen::VectorXd deviations_of(const Difference& d, const std::vector<std::size_t
   return deviation;
 }
 
-void add_errors(const Difference& d, const model::CellParameters<>& cell, std::vector<InstrumentError>& errors) {
-  if (d.error.size() == 0) return;
+/// Returns true if the effect at its largest is more than the trusted instrument's own error. A gain is not, where no
+/// current flows.
+bool can_be_seen(const Effect& e, const Difference& d, const model::CellParameters<>& cell) {
+  return e.by_row.lpNorm<Eigen::Infinity>() * model::catalogue[e.mechanism].parameter[0].upper(cell.capacity_ah) >
+         d.own;
+}
+
+void add_errors(const Difference& all, const model::CellParameters<>& cell, std::vector<InstrumentError>& errors) {
+  if (all.error.size() == 0) return;
+  Difference d = all;
+  std::erase_if(d.effects, [&](const Effect& e) { return !can_be_seen(e, all, cell); });
   const Eigen::VectorXd weight = weights_of(d);
   std::vector<std::size_t> allowed(d.effects.size());
   for (std::size_t k = 0; k < allowed.size(); ++k) allowed[k] = k;

@@ -16,7 +16,7 @@ namespace {
 
 using measurement::HealthyRegime;
 
-constexpr const Thresholds::Healthy& learned_limits = thresholds.healthy;
+constexpr const HealthyThresholds& learned_limits = thresholds.healthy;
 
 /// Returns true if healthy recordings were there for some time, or if nothing is known of the axis.
 bool was_at(const std::vector<HealthyRegime>& regimes, std::string_view axis, double value, double beyond) {

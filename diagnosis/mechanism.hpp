@@ -6,6 +6,7 @@
 // file has the defaults, and is diagnosed by them. mechanisms/all.hpp includes the files.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <optional>
@@ -83,6 +84,12 @@ struct Usual {
 
 inline constexpr std::size_t no_mechanism = model::mechanism_count;
 
+/// The first strength of a mechanism; 0 if it is not among them.
+inline double first_strength(const std::vector<MechanismSetting>& all, std::size_t mechanism) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const auto& s) { return s.index == mechanism; });
+  return found == all.end() ? 0 : found->value[0];
+}
+
 /// What holds for a mechanism of which nothing special is known; and what there is to say of one.
 template <class M>
 struct DefaultKnowledge {
@@ -150,6 +157,11 @@ struct DefaultKnowledge {
   static bool expected(const model::CellParameters<>& /*cell*/, const RecordingFacts& /*facts*/) { return false; }
   /// Gain that it has before any voltage is looked at.
   static double prior_gain(const RecordingFacts& /*facts*/) { return 0; }
+  /// Returns true if no cell or instrument is so. all: the mechanisms of the hypothesis.
+  static bool is_implausible(const MechanismSetting& /*s*/, const std::vector<MechanismSetting>& /*all*/,
+                             const RecordingFacts& /*facts*/) {
+    return false;
+  }
   /// Changes a setting to what holds in a later recording of the same cell and instruments. Returns false if nothing
   /// of it holds there.
   static bool carry_over(MechanismSetting& /*s*/) { return true; }
@@ -201,6 +213,7 @@ struct MechanismKnowledge {
   Bounds (*bounds)(std::size_t, Bounds, double);
   bool (*expected)(const model::CellParameters<>&, const RecordingFacts&);
   double (*prior_gain)(const RecordingFacts&);
+  bool (*is_implausible)(const MechanismSetting&, const std::vector<MechanismSetting>&, const RecordingFacts&);
   bool (*carry_over)(MechanismSetting&);
   void (*after_full_charge)(MechanismSetting&);
   void (*after_full_discharge)(MechanismSetting&);

@@ -40,6 +40,7 @@ constexpr MechanismKnowledge knowledge() {
           .bounds = K::bounds,
           .expected = K::expected,
           .prior_gain = K::prior_gain,
+          .is_implausible = K::is_implausible,
           .carry_over = K::carry_over,
           .after_full_charge = K::after_full_charge,
           .after_full_discharge = K::after_full_discharge,

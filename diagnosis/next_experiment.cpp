@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
 
-#include "diagnosis/reference.hpp"
+#include "diagnosis/experiment_plan.hpp"
 #include "diagnosis/texts.hpp"
 #include "diagnosis/thresholds.hpp"
 
@@ -55,78 +55,6 @@ double least_capacity_ah(double capacity_ah, const std::vector<Rival>& rivals) {
          design_numerics.capacity_steps_per_ah;
 }
 
-/// What a hypothesis' current sensor reads of a current: its laws inverted by bisection.
-double read_a(const model::ChosenLaws<double>& laws, double true_a, double capacity_ah) {
-  double low = 2 * std::min(true_a, 0.0) - capacity_ah, high = 2 * std::max(true_a, 0.0) + capacity_ah;
-  for (int k = 0; k < design_numerics.halvings; ++k) {
-    const double middle = (low + high) / 2;
-    (laws.true_current(middle) < true_a ? low : high) = middle;
-  }
-  return (low + high) / 2;
-}
-
-/// A course as a recording of which nothing has been read yet.
-struct Plan {
-  PreparedRecording record;
-  std::vector<experiments::ProfileRow> rows;
-};
-
-/// What is to be planned for.
-struct Setting {
-  const model::CellParameters<>& cell;
-  double capacity_ah;
-  bool temperature;  ///< is recorded
-};
-
-Plan planned(const experiments::Experiment& experiment, const Setting& setting, double step_s) {
-  experiments::ExperimentOptions options;
-  options.capacity_ah = setting.capacity_ah;
-  options.step_s = step_s;
-  Plan p{{}, bms::experiments::experiment(experiment.name, options).value()};
-  PreparedRecording& r = p.record;
-  r.initial_soc = experiment.start_soc;
-  r.initial_soc_sigma = std::max(setting.cell.tolerance.initial_soc, design_limits.initial_soc_at_least);
-  for (const experiments::ProfileRow& row : p.rows) {
-    r.time_s.edit().push_back(row.time_s);
-    r.current_a.edit().push_back(row.current_a);
-    r.voltage_v.edit().push_back(0);
-    const bool given = std::isfinite(row.temperature_c);
-    if (setting.temperature || given)
-      r.temperature_c.edit().push_back(given ? row.temperature_c : setting.cell.reference_temperature_c);
-  }
-  return p;
-}
-
-/// What the instruments of a hypothesis would read on the course, and trusted ones alongside. within: set to false if
-/// the cell leaves its design_limits.
-PreparedRecording read_under(const Rival& truth, const Plan& plan, const model::CellParameters<>& cell, bool& within) {
-  PreparedRecording r = plan.record;
-  const std::vector<MechanismSetting>& settings = truth.hypothesis.settings;
-  const model::ChosenLaws<double> laws = model::chosen<double>(settings, cell.capacity_ah);
-  double known_a = 0, known_read_a = read_a(laws, 0, cell.capacity_ah);
-  for (double& a : r.current_a.edit()) {
-    if (a != known_a) {
-      known_a = a;
-      known_read_a = read_a(laws, a, cell.capacity_ah);
-    }
-    a = known_read_a;
-  }
-  std::vector<MechanismSetting> inside = settings;
-  std::erase_if(inside, [](const MechanismSetting& s) { return knowledge_of(s.index).outside_cell; });
-  std::vector<double> soc, current_ref_a, voltage_ref_v;
-  const std::vector<double> volts = predict(cell, settings, r, &soc), terminal_v = predict(cell, inside, r);
-  for (std::size_t k = 0; k < r.size(); ++k) {
-    const experiments::ProfileRow& row = plan.rows[k];
-    r.voltage_v.edit()[k] = std::isfinite(row.source_v) ? laws.reading(row.source_v) : volts[k];
-    current_ref_a.push_back(row.current_ref_a());
-    voltage_ref_v.push_back(row.voltmeter ? terminal_v[k] : row.source_v);
-    within = within && soc[k] > design_limits.soc_lowest && soc[k] < design_limits.soc_highest &&
-             volts[k] > cell.limits.voltage_min_v && volts[k] < cell.limits.voltage_max_v;
-  }
-  average_references(r, current_ref_a, voltage_ref_v, cell);
-  return r;
-}
-
 /// Gain by which a rival would still miss a recording after it has adapted, in -2 log posterior.
 double missed(const Rival& rival, const PreparedRecording& seen, const model::CellParameters<>& cell,
               const NoiseModel& noise) {
@@ -158,14 +86,14 @@ struct Judged {
 };
 
 /// What a course would show of a set of rivals, the finding first; nothing if the cell would leave its design_limits.
-std::optional<Judged> judged(const experiments::Experiment& e, const Setting& setting, double duration_s,
+std::optional<Judged> judged(const experiments::Experiment& e, const PlanSetting& setting, double duration_s,
                              const std::vector<Rival>& set, NoiseModel noise) {
-  const double step_s = e.step_s < 1 ? e.step_s : std::max(1.0, std::ceil(duration_s / design_limits.rows));
-  const Plan plan = planned(e, setting, step_s);
-  noise.white_v /= std::sqrt(std::max(step_s, 1.0));  // a row stands for so many readings
+  const double step_s = coarse_step_s(e, duration_s);
+  const ExperimentPlan plan = planned(e, setting, step_s);
+  noise = of_coarse_rows(noise, step_s);
   bool within = true;
   std::vector<PreparedRecording> seen;
-  for (const Rival& truth : set) seen.push_back(read_under(truth, plan, setting.cell, within));
+  for (const Rival& truth : set) seen.push_back(read_under(truth.hypothesis.settings, plan, setting.cell, within));
   if (!within) return std::nullopt;
   Judged j{{.profile = std::string(e.name),
             .capacity_ah = setting.capacity_ah,
@@ -197,29 +125,19 @@ std::optional<Judged> judged(const experiments::Experiment& e, const Setting& se
   return j;
 }
 
-/// Courses with a defined start and their durations [s], the shortest first.
-std::vector<std::pair<double, const experiments::Experiment*>> courses(const Setting& setting) {
-  std::vector<std::pair<double, const experiments::Experiment*>> all;
-  for (const experiments::Experiment& e : experiments::experiments()) {
-    if (std::isfinite(e.start_soc))
-      all.emplace_back(planned(e, setting, design_limits.survey_step_s).record.duration_s(), &e);
-  }
-  std::stable_sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-  return all;
-}
-
 }  // namespace
 
 std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, const Finding& f,
-                                              bool temperature) {
+                                              bool temperature, const std::vector<std::string>& carried_out) {
   if (f.rivals.empty()) return std::nullopt;
   std::vector<Rival> set = {in_later_recording(f.setting.index, {d.extended, d.covariance})};
   for (std::size_t k = 0; k < f.rivals.size() && set.size() < design_limits.rivals; ++k)
     set.push_back(in_later_recording(f.equivalent_to[k], f.rivals[k]));
-  const Setting setting{cell, least_capacity_ah(cell.capacity_ah, set), temperature};
+  const PlanSetting setting{cell, least_capacity_ah(cell.capacity_ah, set), temperature};
 
   std::optional<Judged> best;
   for (const auto& [duration_s, course] : courses(setting)) {
+    if (std::find(carried_out.begin(), carried_out.end(), course->name) != carried_out.end()) continue;
     std::optional<Judged> j = judged(*course, setting, duration_s, set, d.noise);
     if (!j || j->next.separates.size() < 2) continue;
     const bool enough = j->all;
@@ -230,11 +148,11 @@ std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cel
   return best->next;
 }
 
-std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d,
-                                              bool temperature) {
+std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& d, bool temperature,
+                                              const std::vector<std::string>& carried_out) {
   for (const Finding& f : d.findings) {
     if (f.rivals.empty()) continue;
-    if (auto next = next_experiment(cell, d, f, temperature)) return next;
+    if (auto next = next_experiment(cell, d, f, temperature, carried_out)) return next;
   }
   return std::nullopt;
 }

@@ -27,14 +27,16 @@ struct NextExperiment {
   double gain = 0;                     ///< smallest expected gain between the finding and the others of `separates`
 };
 
-/// For one finding. temperature: whether it is recorded. Nothing if it has no rivals or no course separates it from
-/// any.
+/// For one finding. temperature: whether it is recorded. carried_out: names of courses that are among the recordings,
+/// which are not proposed again: their repetition would show the same. Nothing if the finding has no rivals or no
+/// other course separates it from any.
 std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& diagnosis,
-                                              const Finding& finding, bool temperature);
+                                              const Finding& finding, bool temperature,
+                                              const std::vector<std::string>& carried_out = {});
 
 /// For the strongest finding that has rivals and a course to separate them.
 std::optional<NextExperiment> next_experiment(const model::CellParameters<>& cell, const Diagnosis& diagnosis,
-                                              bool temperature);
+                                              bool temperature, const std::vector<std::string>& carried_out = {});
 
 /// One sentence: "To distinguish A from B: pulses of ... (2:30 h)."
 std::string why(const NextExperiment& next);

@@ -18,6 +18,9 @@ struct Statistics {
   double wilson_hilferty = 2.0 / 9;          ///< their factor
   std::size_t blocks = 24;                   ///< of a recording, whose errors are independent of each other
   double normal_of_two_sigma = 1.690;        ///< one-sided quantile at the probability of two sigma on both sides
+  /// Of 1, 2 and 3 powers of 1 / degrees of freedom, in the 97.5 % quantile of Student's distribution over the normal
+  /// one (Abramowitz and Stegun, 26.7.5).
+  std::array<double, 3> student_975 = {1.2104, 1.4401, 1.3041};
 };
 
 struct Numerics {
@@ -99,6 +102,7 @@ struct Numerics {
     int halvings = 60;  ///< to invert the current sensor's laws
     double covariance_share = 1e-6, covariance = 1e-18;
     double capacity_steps_per_ah = 100;  ///< capacity of a course, rounded down
+    std::size_t shape_points = 400;      ///< by which a recording is compared with a course
   };
 
   double middle_soc = 0.5;  ///< at which a cell's R0, R1 and C1 are compared with a mechanism's

@@ -105,7 +105,7 @@ void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood,
     std::vector<std::size_t> alike;
     for (const std::size_t m : alike_at_one_current) {
       if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr &&
-          !reads_trusted(likelihood.facts(), m))
+          !reads_trusted(likelihood.facts().trusted_current, likelihood.facts().trusted_voltage, m))
         alike.push_back(m);
     }
     f.probability /= static_cast<double>(1 + alike.size());  // none is more probable than another

@@ -153,9 +153,9 @@ class Elimination {
 
   /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
-    return scope_.expected.contains(m) || (!is_weak(f, m, scope_.expected) && !is_implausible(f, m) &&
-                                           !is_within_jitter(f, m, likelihood_.facts().step_s) &&
-                                           !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
+    return scope_.expected.contains(m) ||
+           (!is_weak(f, m, scope_.expected) && !is_implausible(f, m, likelihood_.facts()) &&
+            !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
   }
 
   /// The cell file may contain what is certain in other tables, and has a small error then.

@@ -13,34 +13,12 @@ namespace {
 using model::catalogue;
 using model::Role;
 
-/// One setting of a mechanism, and the derivatives by those of its parameters that are probed.
-struct Derivatives {
-  Probe probe;
-  Columns columns;
-};
-
-Derivatives derivatives_of(const LikelihoodModel& likelihood, const HypothesisFit& around,
-                           const MechanismSetting& setting) {
-  const model::MechanismInfo& info = catalogue[setting.index];
-  const Hypothesis probe = with(around.hypothesis, setting);
-  Derivatives d{{setting, {}, 0, 0}, {}};
-  std::vector<ParameterRef> by;
-  for (std::size_t k = 0; k < info.parameters; ++k) {
-    const Role role = info.parameter[k].role;
-    if (role != Role::strength && !(role == Role::place && knowledge_of(setting.index).probes_places)) continue;
-    d.probe.parameters.push_back(k);
-    by.push_back({probe.settings.size() - 1, k});
-  }
-  d.columns = likelihood.derivatives(probe, around.calibration, by);
-  return d;
-}
-
 /// Collects probes and their columns.
 class Collector {
  public:
   explicit Collector(const LikelihoodModel& likelihood) : likelihood_(likelihood) {}
 
-  void add(Derivatives d) {
+  void add(ProbedColumns d) {
     d.probe.block = set_.blocks.size();
     set_.probes.push_back(std::move(d.probe));
     set_.blocks.push_back(std::move(d.columns));
@@ -78,6 +56,22 @@ class Collector {
 };
 
 }  // namespace
+
+ProbedColumns signature_at(const LikelihoodModel& likelihood, const HypothesisFit& around,
+                           const MechanismSetting& setting) {
+  const model::MechanismInfo& info = catalogue[setting.index];
+  const Hypothesis probe = with(around.hypothesis, setting);
+  ProbedColumns d{{setting, {}, 0, 0}, {}};
+  std::vector<ParameterRef> by;
+  for (std::size_t k = 0; k < info.parameters; ++k) {
+    const Role role = info.parameter[k].role;
+    if (role != Role::strength && !(role == Role::place && knowledge_of(setting.index).probes_places)) continue;
+    d.probe.parameters.push_back(k);
+    by.push_back({probe.settings.size() - 1, k});
+  }
+  d.columns = likelihood.derivatives(probe, around.calibration, by);
+  return d;
+}
 
 std::vector<MechanismSetting> probe_settings(const LikelihoodModel& likelihood, std::size_t mechanism) {
   const double capacity_ah = likelihood.cell().capacity_ah;
@@ -119,11 +113,11 @@ SignatureSet signatures(const LikelihoodModel& likelihood, const HypothesisFit& 
     const std::vector<MechanismSetting> of = probe_settings(likelihood, mechanism);
     settings.insert(settings.end(), of.begin(), of.end());
   }
-  std::vector<Derivatives> derivatives(settings.size());
+  std::vector<ProbedColumns> probed_columns(settings.size());
   measurement::in_parallel(settings.size(),
-                           [&](std::size_t k) { derivatives[k] = derivatives_of(likelihood, around, settings[k]); });
+                           [&](std::size_t k) { probed_columns[k] = signature_at(likelihood, around, settings[k]); });
   Collector collector(likelihood);
-  for (Derivatives& d : derivatives) collector.add(std::move(d));
+  for (ProbedColumns& d : probed_columns) collector.add(std::move(d));
   for (const std::size_t mechanism : over) {
     if (probed(mechanism, Signature::contact_change)) collector.add_contact_change(mechanism);
   }

@@ -23,6 +23,14 @@ struct SignatureSet {
   std::vector<Columns> blocks;  ///< white, LikelihoodModel::samples() rows
 };
 
+/// A mechanism at one setting, and its derivatives by those of its parameters that are probed: white.
+struct ProbedColumns {
+  Probe probe;
+  Columns columns;
+};
+ProbedColumns signature_at(const LikelihoodModel& likelihood, const HypothesisFit& around,
+                           const MechanismSetting& setting);
+
 /// Settings at which the signature of a testable mechanism is taken: every shape of its grid, strengths just off a
 /// bound at 0.
 std::vector<MechanismSetting> probe_settings(const LikelihoodModel& likelihood, std::size_t mechanism);

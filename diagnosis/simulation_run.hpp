@@ -8,6 +8,7 @@
 #include "arithmetic/vector_width.hpp"
 #include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/mechanisms/all.hpp"
+#include "diagnosis/testability.hpp"
 #include "model/corrected_readings.hpp"
 
 namespace bms::diagnosis {
@@ -44,6 +45,8 @@ SimulationSetup<S> LikelihoodModel::setup_for(const std::vector<model::Mechanism
   setup.initial_soc += base.initial_soc_shift(record);
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
     setup.own = k < h.own;
+    // else the errors of an instrument would also be sought in recordings that another one has made
+    if (reads_trusted(r.trusted_current, r.trusted_voltage, h.settings[k].index)) continue;
     model::visit_mechanism(h.settings[k].index,
                            [&]<class M>(std::type_identity<M>) { Knowledge<M>::template set_up<S>(setup, values[k]); });
   }

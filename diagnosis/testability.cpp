@@ -8,11 +8,12 @@
 
 namespace bms::diagnosis {
 
-bool reads_trusted(const RecordingFacts& facts, std::size_t mechanism) {
+bool reads_trusted(bool trusted_current, bool trusted_voltage, std::size_t mechanism) {
+  if (!trusted_current && !trusted_voltage) return false;
   const std::string_view id = model::catalogue[mechanism].id;
   const bool of_current = id.starts_with("current_") || id == model::ChannelSkew::id,
              of_voltage = id.starts_with("voltage_") || id.starts_with("contact_");
-  return (facts.trusted_current && of_current) || (facts.trusted_voltage && of_voltage);
+  return (trusted_current && of_current) || (trusted_voltage && of_voltage);
 }
 
 std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const Hypothesis& given,
@@ -20,7 +21,8 @@ std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const
   const MechanismKnowledge& knowledge = knowledge_of(mechanism);
   if (knowledge.only_a_term) return "it is a term of an unknown cause";
   const RecordingFacts& facts = likelihood.facts();
-  if (reads_trusted(facts, mechanism)) return "a trusted instrument's readings are used";
+  if (reads_trusted(facts.trusted_current, facts.trusted_voltage, mechanism))
+    return "a trusted instrument's readings are used";
   // two with the same recording would grow without bounds in opposite directions
   const std::size_t same = knowledge.same_recording_as;
   if (same != no_mechanism && given.find(same) != nullptr && !facts.trusted_instruments)

@@ -11,7 +11,7 @@
 namespace bms::diagnosis {
 
 /// Returns true if it is an error of an instrument in whose place a trusted one is read.
-bool reads_trusted(const RecordingFacts& facts, std::size_t mechanism);
+bool reads_trusted(bool trusted_current, bool trusted_voltage, std::size_t mechanism);
 
 /// Why these recordings cannot test a mechanism in addition to those given; nothing if they can.
 std::optional<std::string> not_testable(const LikelihoodModel& likelihood, const Hypothesis& given,

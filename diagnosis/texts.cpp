@@ -133,8 +133,8 @@ std::string ambiguous_text(const Diagnosis& d, const RecordingFacts& facts) {
   const Finding& f = d.findings.front();
   std::vector<std::string> parts = {claim(f.setting)};
   for (const std::size_t m : f.equivalent_to) parts.push_back(brief_of(m));
-  return fmt::format("{} Either {}. This recording cannot distinguish them. Another experiment is needed.",
-                     model_error(facts), joined(parts, "or"));
+  return fmt::format("{} Either {}. {} cannot distinguish them. {}", model_error(facts), joined(parts, "or"),
+                     d.views.size() > 1 ? "These recordings" : "This recording", another_experiment);
 }
 
 std::string causes_text(const Diagnosis& d, const RecordingFacts& facts) {
@@ -275,6 +275,21 @@ std::vector<std::string> at_temperature_text(const Diagnosis& d, const std::vect
                                   quantity(r.reference->ohm, r.reference->std_ohm, "ohm"));
   }
   return parts;
+}
+
+std::string nothing_more_text(const Diagnosis& d) {
+  const auto f = std::find_if(d.findings.begin(), d.findings.end(), [](const Finding& g) { return !g.rivals.empty(); });
+  if (f == d.findings.end()) return "";
+  std::vector<std::string> others;
+  std::string actions(text_of_mechanism(f->setting.index).action);
+  for (const std::size_t m : f->equivalent_to) {
+    others.emplace_back(text_of_mechanism(m).name);
+    if (others.size() < text_style.causes_in_full) actions += fmt::format(" {}", text_of_mechanism(m).action);
+  }
+  return fmt::format(
+      "No other experiment would distinguish {} from {}: nothing more can be learned in this way. Check each directly. "
+      "{}",
+      text_of_mechanism(f->setting.index).name, joined(others, "and"), actions);
 }
 
 void describe(Diagnosis& d, const model::CellParameters<>& cell, const std::vector<PreparedRecording>& records) {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "diagnosis/diagnose.hpp"
@@ -20,6 +21,12 @@ std::string claim(const MechanismSetting& setting);
 
 /// What is wrong, how sure, what to do next.
 std::string statement(const Diagnosis& diagnosis, const RecordingFacts& facts);
+
+/// The end of an ambiguous statement.
+inline constexpr std::string_view another_experiment = "Another experiment is needed.";
+
+/// What to do where causes have rivals that no experiment would distinguish; empty if none has any.
+std::string nothing_more_text(const Diagnosis& diagnosis);
 
 /// Why this finding and not its best rival: the fact that distinguishes them, and by how much the rival fits worse.
 std::string because(const Diagnosis& diagnosis, const Finding& finding, const RecordingFacts& facts);

@@ -1,5 +1,6 @@
 // Every number that a verdict depends on. What belongs to one mechanism alone stands in diagnosis/mechanisms/, what
-// decides on a law without a known cause in law_thresholds.hpp, what only keeps the arithmetic stable in numerics.hpp.
+// decides on a law without a known cause in law_thresholds.hpp, what healthy recordings decide in
+// healthy_thresholds.hpp, what only keeps the arithmetic stable in numerics.hpp.
 //
 // Costs and gains are differences of -2 log posterior (docs/diagnosis_method.md): an effect of x standard deviations
 // gains x^2. Currents in multiples of the capacity per hour end in _c (1C), shares and states of charge are fractions.
@@ -10,6 +11,8 @@
 
 #include <array>
 #include <cstddef>
+
+#include "diagnosis/healthy_thresholds.hpp"
 
 namespace bms::diagnosis {
 
@@ -330,37 +333,17 @@ struct Thresholds {
     double soc_lowest = 0.02, soc_highest = 0.99;  ///< that the cell may reach
     double capacity_lost = 0.995;                  ///< share of the capacity below which the course is made smaller
     double initial_soc_at_least = 1e-4;            ///< sigma of the start
+    double alike = 0.98;                         ///< correlation of the charges from which a recording follows a course
+    double carried_out_share = 0.95;             ///< of a course's duration that is in the recording
+    double scale_least = 0.3, scale_most = 1.5;  ///< recorded charge over that of a course for the nominal capacity
+    double idle_c = 0.02;                        ///< [C] reading of a sensor of which no current flows
   };
 
-  /// Comparison with healthy recordings of the same cell (healthy_null.hpp).
-  struct Healthy {
-    double log_spread = 0.5;          ///< standard deviation, in ln, of the gain on healthy blocks: that of the
-                                      ///< square of an effect that differs by a quarter. A few blocks may agree by
-                                      ///< chance
-    double block_h = 0.5;             ///< [h] expected of a block, without any block
-    double spread_counts = 1;         ///< as if so many more blocks had shown log_spread. With 1 false alarms keep
-                                      ///< their rate up to a spread of 1.5; pooled over 17 sets of NASA B0005, B0007
-                                      ///< and B0025 it is 0.48
-    double blocks_at_least = 2;       ///< for a Student distribution
-    double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
-    double temperature_beyond_k = 5;  ///< [K]
-    double current_beyond = 1.25;     ///< times their largest current
-    double covered_at_least = 0.5;    ///< share of a recording's rows and squared current where healthy ones were
-    double error_times = 1.5;         ///< of the RMS error of healthy recordings: a few know it to a third
-    double error_at_least_v = 5e-4;   ///< [V]
-    double learned_within = 0.95;     ///< share of a recording's rows where healthy ones were, from which their error
-                                      ///< takes the place of the cell file's tolerance
-    double tolerance_counts = 1;      ///< in the band of a prediction the cell file's tolerance counts as so many more
-                                      ///< healthy recordings
-    double tolerance_beyond = 1.5;    ///< factor on the tolerance in that band where no healthy recording was. With
-                                      ///< both, 92 % of the readings of eleven recordings of B0025 and A123 A002 that
-                                      ///< were left out lie within the band, 91 % with a factor of 1
-    double gross_times = 2;           ///< RMS error over the largest of a healthy block, above which it is gross
-  };
-
-  /// Tolerances of an extended cell file are widened by one of these factors (model_tolerance.hpp).
-  struct ModelTolerance {
-    std::array<double, 7> factors = {1, 1.5, 2, 3, 4, 6, 8};
+  /// Which causes can be distinguished (isolability.hpp).
+  struct Isolability {
+    double times_limit = 2;           ///< size of a cause, in its detection limits
+    std::size_t moments = 12;         ///< at which a contact that changes is compared
+    double trusted_readings = 1'500;  ///< of a second instrument in a recording, at most
   };
 
   RecordingFaults recording;
@@ -382,8 +365,9 @@ struct Thresholds {
   References references;
   IdleReading idle_reading;
   Design design;
-  Healthy healthy;
-  ModelTolerance model_tolerance;
+  Isolability isolability;
+  HealthyThresholds healthy;
+  ModelToleranceThresholds model_tolerance;
 };
 
 inline constexpr Thresholds thresholds{};

@@ -86,6 +86,17 @@ struct DetectionLimit {
   double value = 0;  ///< in the parameter's unit
 };
 
+/// Which causes could be distinguished if one of them were there (isolability.hpp).
+struct Isolability {
+  std::vector<DetectionLimit> causes;        ///< and the sizes at which they are compared
+  std::vector<std::vector<double>> gain;     ///< [a][b]: by which these recordings would prefer a to b if a were there
+  std::vector<std::vector<bool>> separable;  ///< by cause and cause: enough, whichever of the two is there
+  /// What separates a pair: second_voltmeter, second_ammeter or the name of an experiment. Empty: these recordings do,
+  /// or nothing that was tried.
+  std::vector<std::vector<std::string>> separated_by;
+};
+inline constexpr const char *second_voltmeter = "second_voltmeter", *second_ammeter = "second_ammeter";
+
 /// Strength of a mechanism that was not found, in its parameter's unit. Faint changes of one recording become a trend
 /// over many.
 struct ChangeEstimate {
@@ -141,7 +152,8 @@ struct Diagnosis {
   double noise_floor_v = 0;
   double unexplained_rmse_v = 0, unexplained_share = 0;
   std::vector<DetectionLimit> limits;
-  std::vector<ChangeEstimate> estimates;       ///< of what a technician can judge
+  std::optional<Isolability> isolability;  ///< nothing: the recordings can test nothing, or healthy data are learned
+  std::vector<ChangeEstimate> estimates;   ///< of what a technician can judge
   std::optional<CellResistances> resistances;  ///< nothing: without a temperature, or of a cell that is not understood
   std::vector<NotTestable> not_testable;
   std::vector<DataFault> faults;

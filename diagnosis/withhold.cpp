@@ -11,7 +11,7 @@ namespace bms::diagnosis {
 
 namespace {
 
-constexpr const Thresholds::Healthy& withhold_limits = thresholds.healthy;
+constexpr const HealthyThresholds& withhold_limits = thresholds.healthy;
 
 double total_duration_s(const std::vector<PreparedRecording>& records) {
   double sum_s = 0;

@@ -57,7 +57,7 @@ HealthyRegime read_regime(TomlTable& table) {
   r.rms_v = not_negative(table, "rms_v");
   r.spread_v = not_negative(table, "spread_v");
   if (table.has("parts")) r.parts = not_negative(table, "parts");
-  r.high_v = table.has("high_v") ? not_negative(table, "high_v") : r.rms_v;
+  if (table.has("high_v")) not_negative(table, "high_v");  // of older files
   table.finish();
   return r;
 }
@@ -84,7 +84,7 @@ std::string block_text(const HealthyBlock& b) {
 std::string regime_text(const HealthyRegime& r) {
   return "\n[[healthy.regime]]\naxis = " + quoted(r.axis) + "\n" + line("from", r.from) + line("to", r.to) +
          line("hours", r.hours) + line("bias_v", r.bias_v) + line("rms_v", r.rms_v) + line("spread_v", r.spread_v) +
-         line("parts", r.parts) + line("high_v", r.high_v);
+         line("parts", r.parts);
 }
 
 }  // namespace

@@ -103,7 +103,7 @@ class Runner {
     for (const fs::path& file : {depot_.result(key), page, identified}) {
       if (!file.empty()) fs::create_directories(file.parent_path());
     }
-    std::vector<std::string> argv = {options_.program.string()};
+    std::vector<std::string> argv = {options_.program.string(), "--processors", std::to_string(options_.processors)};
     for (std::string& a : arguments_of(depot_, unit, "-", page.string(), identified.string()))
       argv.push_back(std::move(a));
     const std::string of_recording = recording_hash(unit.recording), of_cell = cell_hash(unit.cell);

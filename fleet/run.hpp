@@ -12,6 +12,7 @@ namespace bms::fleet {
 struct RunOptions {
   std::filesystem::path program;          ///< the tool itself
   std::size_t jobs = 1;                   ///< processes at a time
+  std::size_t processors = 1;             ///< of each process
   std::size_t part = 0, parts = 1;        ///< every `parts`-th unit, from `part`
   std::function<bool()> stopped;          ///< asked between units; running ones are then killed
   std::function<void(std::size_t)> done;  ///< called after each unit with the number of units that are done

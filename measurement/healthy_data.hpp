@@ -52,7 +52,6 @@ struct HealthyRegime {
   double rms_v = 0;
   double spread_v = 0;  ///< standard deviation of the blocks' means
   double parts = 1;     ///< recordings that were there; of a single recording, its blocks
-  double high_v = 0;    ///< RMS, with the standard deviation of the parts' mean squares added to their mean
 };
 
 struct HealthyData {

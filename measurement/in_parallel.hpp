@@ -17,6 +17,9 @@ inline std::atomic<int>& idle_processors() {
   return idle;
 }
 
+/// Limits the processors of all calls together, that of the caller included. To be called before any of them.
+inline void use_processors(int at_most) { idle_processors() = std::max(1, at_most) - 1; }
+
 /// Pieces into which work that can be cut as one likes is best cut at present: one if no other processor is idle.
 inline std::size_t best_pieces() { return static_cast<std::size_t>(std::max(0, idle_processors().load())) + 1; }
 

@@ -11,9 +11,12 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "identification/goodness_of_fit.hpp"
+#include "reports/detectability.hpp"
+#include "reports/diagnosis_charts.hpp"
 #include "reports/embedded_files.hpp"
 #include "reports/law_chart.hpp"
 #include "reports/report_page.hpp"
+#include "workflow/next_steps.hpp"
 
 namespace bms::reports {
 
@@ -23,14 +26,8 @@ using diagnosis::text_of_mechanism;
 using model::catalogue;
 using nlohmann::json;
 
-constexpr std::size_t strip_bins = 600;     ///< of the strip, over all recordings: the width of a screen
-constexpr std::size_t chart_rows = 40'000;  ///< of the charts, over all recordings
+constexpr std::size_t strip_bins = 600;  ///< of the strip, over all recordings: the width of a screen
 constexpr std::size_t regime_bins = 30;
-
-json rounded(double value, int decimals) {
-  const double scale = std::pow(10, decimals);
-  return std::isfinite(value) ? json(std::round(value * scale) / scale) : json(nullptr);
-}
 
 json rms_mv(const identification::ErrorFigure& error) {
   return error.count() > 0 ? rounded(1e3 * error.rms(), 3) : json(nullptr);
@@ -195,34 +192,6 @@ json figures(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-json chart_of(const workflow::DiagnoseResult& r, const workflow::RecordingComparison& c, bool holdout,
-              std::size_t most) {
-  json chart = {{"name", c.record.name}, {"holdout", holdout}};
-  const auto rows = shown_rows(c.recording, most);
-  const auto add = [&](const char* name, int decimals, auto&& value) {
-    json column = json::array();
-    for (const std::size_t k : rows) column.push_back(rounded(value(k), decimals));
-    chart[name] = std::move(column);
-  };
-  add("time_s", 3, [&](std::size_t k) { return c.record.time_s[k] - c.record.time_s.front(); });
-  add("measured_v", 4, [&](std::size_t k) { return c.record.voltage_v[k]; });
-  add("base_v", 4, [&](std::size_t k) { return c.base_v[k]; });
-  add("before_mv", 2, [&](std::size_t k) { return 1e3 * (c.record.voltage_v[k] - c.base_v[k]); });
-  if (r.named()) {
-    add("extended_v", 4, [&](std::size_t k) { return c.extended_v[k]; });
-    add("after_mv", 2, [&](std::size_t k) { return 1e3 * (c.record.voltage_v[k] - c.extended_v[k]); });
-  }
-  return chart;
-}
-
-json charts(const workflow::DiagnoseResult& r) {
-  json list = json::array();
-  const std::size_t most = std::max<std::size_t>(2'000, chart_rows / (r.recordings.size() + r.holdouts.size()));
-  for (const workflow::RecordingComparison& c : r.holdouts) list.push_back(chart_of(r, c, true, most));
-  for (const workflow::RecordingComparison& c : r.recordings) list.push_back(chart_of(r, c, false, most));
-  return list;
-}
-
 // ---- errors over an axis: SOC, current, temperature, time since a current step
 struct Axis {
   const char *id, *title, *unit;
@@ -320,20 +289,6 @@ json regimes(const workflow::DiagnoseResult& r) {
   return list;
 }
 
-json limits(const workflow::DiagnoseResult& r) {
-  json list = json::array();
-  for (const diagnosis::DetectionLimit& l : r.diagnosis.limits) {
-    const model::MechanismInfo& info = catalogue[l.mechanism];
-    const model::Parameter& p = info.parameter[l.parameter];
-    list.push_back({{"id", info.id},
-                    {"name", text_of_mechanism(l.mechanism).name},
-                    {"text", diagnosis::parameter_text(p, l.value, 0)},
-                    {"ratio", rounded(l.value / p.upper(r.cell.parameters.capacity_ah), 7)}});
-  }
-  std::stable_sort(list.begin(), list.end(), [](const json& a, const json& b) { return a["ratio"] < b["ratio"]; });
-  return list;
-}
-
 /// A warning with the file's name instead of its path.
 std::string without_folder(const std::string& text, const workflow::DiagnoseResult& r) {
   for (const auto* list : {&r.recordings, &r.holdouts}) {
@@ -379,19 +334,19 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
                            {"share", rounded(d.unexplained_share, 4)},
                            {"explained", rounded(d.explained_share, 4)}};
   report["regimes"] = regimes(r);
-  report["limits"] = limits(r);
+  report["limits"] = limits_chart(r);
+  report["isolability"] = isolability_chart(d);
   report["not_testable"] = json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     report["not_testable"].push_back(
         {{"id", catalogue[n.mechanism].id}, {"name", text_of_mechanism(n.mechanism).name}, {"reason", n.reason}});
-  report["next"] = r.next ? json{{"why", diagnosis::why(*r.next)},
-                                 {"instruction", diagnosis::instruction(*r.next)},
-                                 {"command", diagnosis::command(*r.next)}}
-                          : json(nullptr);
-  report["charts"] = charts(r);
+  report["next"] = workflow::next_steps(r);
+  report["charts"] = diagnosis_charts(r);
+  report["intervals"] = interval_texts(r);
   report["law"] = law_chart(r);
   const std::string script = std::string(embedded::diagnosis_strip_js) + std::string(embedded::diagnosis_regimes_js) +
-                             std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_js);
+                             std::string(embedded::diagnosis_law_js) + std::string(embedded::diagnosis_isolability_js) +
+                             std::string(embedded::diagnosis_js);
   return page(embedded::diagnosis_html, script, "bms diagnose",
               in_script(report.dump(-1, ' ', false, json::error_handler_t::replace)));
 }

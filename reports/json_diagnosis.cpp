@@ -1,7 +1,9 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/withheld_text.hpp"
+#include "reports/detectability.hpp"
 #include "reports/json_parts.hpp"
 #include "reports/json_results.hpp"
+#include "workflow/diagnosis_comparison.hpp"
 
 namespace bms::reports {
 
@@ -77,6 +79,26 @@ Json inputs_of(const std::vector<workflow::RecordingComparison>& recordings) {
   return list;
 }
 
+Json holdouts_of(const std::vector<workflow::RecordingComparison>& holdouts) {
+  Json list = Json::array();
+  for (const workflow::RecordingComparison& c : holdouts) {
+    list.push_back({{"path", c.recording.path},
+                    {"samples", c.record.size()},
+                    {"initial_soc", c.record.initial_soc},
+                    {"coverage", number(c.interval.coverage.share())},
+                    {"half_width_v", number(c.interval.coverage.half_width_v())}});
+  }
+  return list;
+}
+
+/// Share of the readings within the 95 % interval of the extended cell.
+Json coverage_of(const workflow::DiagnoseResult& r) {
+  const auto share = [](const std::optional<diagnosis::Coverage>& c) { return c ? number(c->share()) : Json(nullptr); };
+  return {{"nominal", diagnosis::nominal_coverage},
+          {"recording", share(coverage(r.recordings))},
+          {"holdout", share(coverage(r.holdouts))}};
+}
+
 Json location_of(const diagnosis::Diagnosis& d) {
   Json regimes = Json::array();
   for (const diagnosis::Regime& g : d.regimes) {
@@ -109,6 +131,15 @@ Json limits_of(const diagnosis::Diagnosis& d) {
                     {"parameter", info.parameter[l.parameter].name},
                     {"value", number(l.value)},
                     {"unit", info.parameter[l.parameter].unit}});
+  }
+  return list;
+}
+
+/// How much speaks for each law that an unknown cause may act on, the likeliest first.
+Json laws_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::LawEvidence& e : d.law ? d.law->laws : std::vector<diagnosis::LawEvidence>{}) {
+    if (e.law[0] != 0) list.push_back({{"law", e.law}, {"depends_on", e.depends_on}, {"evidence", number(e.gain)}});
   }
   return list;
 }
@@ -175,13 +206,14 @@ Json withheld_of(const diagnosis::Diagnosis& d) {
   return list;
 }
 
-Json experiment_of(const diagnosis::NextExperiment& next) {
+Json experiment_of(const diagnosis::NextExperiment& next, const std::string& then) {
   return {{"profile", next.profile},
           {"separates", ids_of(next.separates)},
           {"leaves", ids_of(next.leaves)},
           {"why", diagnosis::why(next)},
           {"command", diagnosis::command(next)},
           {"instruction", diagnosis::instruction(next)},
+          {"then", then},
           {"start_soc", number(next.start_soc)},
           {"duration_s", number(next.duration_s)},
           {"expected_gain", number(next.gain)}};
@@ -195,10 +227,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["command"] = "diagnose";
   json["cell"] = r.cell.name;
   json["recordings"] = inputs_of(r.recordings);
-  json["holdouts"] = Json::array();
-  for (const workflow::RecordingComparison& c : r.holdouts)
-    json["holdouts"].push_back(
-        {{"path", c.recording.path}, {"samples", c.record.size()}, {"initial_soc", c.record.initial_soc}});
+  json["holdouts"] = holdouts_of(r.holdouts);
   json["verdict"] = name_of(d.verdict);
   json["statement"] = d.statement;
   json["location"] = location_of(d);
@@ -211,12 +240,14 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["candidates"] = candidates_of(d);
   json["baseline"] = {{"recording", figures_of(r.baseline)}, {"holdout", figures_of(r.baseline_holdout)}};
   json["extended"] = {{"recording", figures_of(r.extended)}, {"holdout", figures_of(r.extended_holdout)}};
+  json["coverage"] = coverage_of(r);
   json["soc"] =
       r.soc ? Json{{"baseline_rmse", r.soc->baseline_rmse}, {"extended_rmse", r.soc->extended_rmse}} : Json(nullptr);
   json["noise_floor_v"] = number(d.noise_floor_v);
   json["unexplained"] = {{"rmse_v", number(d.unexplained_rmse_v)}, {"share", number(d.unexplained_share)}};
   json["law"] = d.law ? Json(d.law->law) : Json(nullptr);
   json["depends_on"] = d.law ? Json(d.law->depends_on) : Json::array();
+  json["laws"] = laws_of(d);
   json["left_out"] = d.law && d.law->cell ? Json{{"before_rmse_v", number(d.law->left_out_before_v)},
                                                  {"after_rmse_v", number(d.law->left_out_after_v)}}
                                           : Json(nullptr);
@@ -224,6 +255,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                                   {"parameters", parameters_of(*d.law->mechanism)}}
                                            : Json(nullptr);
   json["detection_limits"] = limits_of(d);
+  json["isolability"] = isolability_json(d);
   json["estimates"] = estimates_of(d);
   json["resistances"] = d.resistances ? Json{{"temperature_c", number(d.resistances->temperature_c)},
                                              {"reference_c", number(d.resistances->reference_c)},
@@ -233,7 +265,8 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["not_testable"] = Json::array();
   for (const diagnosis::NotTestable& n : d.not_testable)
     json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
-  json["next_experiment"] = r.next ? experiment_of(*r.next) : Json(nullptr);
+  json["next_experiment"] = r.next ? experiment_of(*r.next, r.then) : Json(nullptr);
+  json["nothing_more"] = r.nothing_more.empty() ? Json(nullptr) : Json(r.nothing_more);
   json["faults"] = Json::array();
   for (const diagnosis::DataFault& f : d.faults)
     json["faults"].push_back({{"id", f.id}, {"text", f.text}, {"spans", spans_of(f.spans)}});

@@ -113,7 +113,14 @@ std::string json_of(const files::CellFile& cell, const std::vector<std::string>&
                   {"doubts", doubts}});
 }
 
-std::string json_of(const host_sim::SimulationResult& r) {
+std::string json_of(const host_sim::SimulationResult& r, const std::optional<diagnosis::Coverage>& coverage) {
+  Json measured = nullptr;
+  if (coverage) {
+    measured = {{"nominal", diagnosis::nominal_coverage},
+                {"recording", number(coverage->share())},
+                {"half_width_v", number(coverage->half_width_v())},
+                {"rmse_v", number(coverage->error_v())}};
+  }
   return text_of({{"command", "simulate"},
                   {"cell", r.cell},
                   {"input", r.input},
@@ -124,6 +131,7 @@ std::string json_of(const host_sim::SimulationResult& r) {
                   {"initial_soc", r.initial_soc},
                   {"final_soc", r.final_soc},
                   {"final_voltage_v", r.final_voltage_v},
+                  {"coverage", measured},
                   {"steps_per_second", r.steps_per_second},
                   {"warnings", warnings_of(r.warnings)}});
 }
@@ -235,7 +243,12 @@ Json joint_of(const std::optional<workflow::JointResult>& joint) {
   }
   json["left_outs"] = json["held_out"] = Json::array();
   for (const identification::LeftOutError& e : choice.left_outs) json["left_outs"].push_back(left_out_of(e));
-  for (const identification::LeftOutError& e : joint->held_out) json["held_out"].push_back(left_out_of(e));
+  for (std::size_t k = 0; k < joint->held_out.size(); ++k) {
+    json["held_out"].push_back(left_out_of(joint->held_out[k]));
+    if (k >= joint->coverage.size()) continue;
+    json["held_out"].back()["coverage"] = number(joint->coverage[k].share());
+    json["held_out"].back()["half_width_v"] = number(joint->coverage[k].half_width_v());
+  }
   const identification::ModelErrors& errors = choice.errors;
   json["errors"] = {{"resistance_fraction", errors.resistance_fraction},
                     {"resistance_per_ev", errors.resistance_per_ev},

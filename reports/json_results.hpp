@@ -1,8 +1,10 @@
 // Results as JSON objects, one per command. Their names are relied on from outside.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "diagnosis/prediction_interval.hpp"
 #include "experiments/profile_figures.hpp"
 #include "host_sim/cuts.hpp"
 #include "host_sim/replay.hpp"
@@ -21,7 +23,9 @@ std::string json_of(const host_sim::CutResult& result);
 std::string json_of(const measurement::Recording& recording, const std::string& out);
 /// Of bms cell.
 std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts);
-std::string json_of(const host_sim::SimulationResult& result);
+/// coverage: of the measured voltage, if there is one and an interval.
+std::string json_of(const host_sim::SimulationResult& result,
+                    const std::optional<diagnosis::Coverage>& coverage = std::nullopt);
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
 std::string json_of(const workflow::IdentifyResult& result);
 std::string json_of(const workflow::DiagnoseResult& result);

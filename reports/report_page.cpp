@@ -265,16 +265,16 @@ json table_of(const files::PageTable& t) {
   return {{"title", t.title}, {"note", t.note}, {"table", {{"head", t.head}, {"rows", std::move(rows)}}}};
 }
 
-double rounded(double value) { return std::round(value * 1e5) / 1e5; }
+double short_number(double value) { return std::round(value * 1e5) / 1e5; }
 
 /// A value, or [low, middle, high] in a chart with bands.
 json point_of(const files::PageChart& c, std::size_t column, std::size_t k) {
   const auto& values = c.columns[column];
   const bool missing = k >= values.size() || !std::isfinite(values[k]);
-  if (c.half_band.empty()) return missing ? json(nullptr) : json(rounded(values[k]));
+  if (c.half_band.empty()) return missing ? json(nullptr) : json(short_number(values[k]));
   if (missing) return json::array({nullptr, nullptr, nullptr});
   const double half = k < c.half_band[column].size() ? c.half_band[column][k] : 0;
-  return json::array({rounded(values[k] - half), rounded(values[k]), rounded(values[k] + half)});
+  return json::array({short_number(values[k] - half), short_number(values[k]), short_number(values[k] + half)});
 }
 
 json chart_of(const files::PageChart& c) {

@@ -1,18 +1,21 @@
 // bms diagnose: where a calibrated cell and its recordings disagree, and which physics or instrument fault causes it.
 #include <cmath>
 #include <csignal>
+#include <string_view>
 
 #include <fmt/format.h>
 
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
+#include "reports/diagnosis_charts.hpp"
 #include "reports/diagnosis_page.hpp"
 #include "reports/json_results.hpp"
 #include "reports/pack_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "workflow/diagnose_recordings.hpp"
+#include "workflow/next_steps.hpp"
 #include "workflow/pack_diagnosis.hpp"
 
 namespace bms::tool {
@@ -58,6 +61,7 @@ std::string comparison_text(const workflow::DiagnoseResult& r) {
         "{:.2f} mV.\n",
         1e3 * r.baseline_holdout->rmse_v, 1e3 * r.extended_holdout->rmse_v, 1e3 * r.diagnosis.noise_floor_v);
   }
+  for (const std::string& line : reports::interval_texts(r)) text += line + "\n";
   if (r.soc) {
     text += fmt::format("Error of their estimated state of charge: {:.2f} % RMS before, {:.2f} % after.\n",
                         100 * r.soc->baseline_rmse, 100 * r.soc->extended_rmse);
@@ -74,9 +78,10 @@ std::string summary(const workflow::DiagnoseResult& r) {
     for (const std::string& at : at_temperature_text(r.diagnosis, r.diagnosis.resistances->cell))
       text += diagnosis::capitalised(at) + ".\n";
   }
-  if (r.next) {
-    text += fmt::format("{}\n  {}\n  {}\n", diagnosis::why(*r.next), diagnosis::instruction(*r.next),
-                        diagnosis::command(*r.next));
+  std::string_view indent;
+  for (const std::string& step : workflow::next_steps(r)) {
+    text += fmt::format("{}{}\n", indent, step);
+    indent = "  ";
   }
   text += comparison_text(r);
   if (!r.out.empty()) text += "Cell file: " + r.out + "\n";
@@ -183,7 +188,7 @@ class DiagnoseCommand final : public Command {
       result.warnings.push_back(
           {"interrupted", "stopped by Ctrl-C: later steps of the search might have changed this result"});
     } else {
-      workflow::add_next_experiment(result);
+      workflow::add_next_experiment(o_, result);
     }
     workflow::add_holdout_warnings(result);
     result.out = out_;

@@ -12,6 +12,7 @@
 #include "fleet/run.hpp"
 #include "fleet/slurm.hpp"
 #include "fleet/table.hpp"
+#include "measurement/in_parallel.hpp"
 #include "reports/fleet_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
@@ -117,6 +118,7 @@ class RunAction {
     const auto progress = progress_on_stderr(0.5, progress_line);
     options.program = std::filesystem::read_symlink("/proc/self/exe");
     options.jobs = o_.jobs;
+    options.processors = std::max<std::size_t>(1, measurement::best_pieces() / std::max<std::size_t>(1, o_.jobs));
     options.stopped = [] { return interrupts != 0; };
     options.done = [&](std::size_t done) {
       if (progress && units > 0) progress(static_cast<double>(done) / static_cast<double>(units), depot.folder);

@@ -67,8 +67,11 @@ std::string joint_summary(const workflow::JointResult& joint) {
     text += fmt::format("  {}: {:.2f} mV, R0 {:+.0f} %\n", joint.recordings[k], 1e3 * choice.fit.rmse_v[k],
                         100 * choice.fit.states[k].r0_change);
   }
-  for (const id::LeftOutError& e : joint.held_out)
+  for (std::size_t k = 0; k < joint.held_out.size(); ++k) {
+    const id::LeftOutError& e = joint.held_out[k];
     text += fmt::format("Held out {}: {:.2f} mV RMS.\n", e.name, 1e3 * e.rmse_v);
+    if (k < joint.coverage.size()) text += diagnosis::sentence_of(joint.coverage[k], e.name) + "\n";
+  }
   return text;
 }
 

@@ -2,10 +2,13 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <iterator>
+#include <optional>
 
 #include <fmt/format.h>
 
+#include "diagnosis/prediction_interval.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
@@ -18,6 +21,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/pack_cells.hpp"
+#include "workflow/diagnose_recordings.hpp"
 
 namespace bms::tool {
 
@@ -31,6 +35,7 @@ struct SimulateOptions {
   CLI::Option* initial_soc_given = nullptr;
   double noise_v = 0, noise_a = 0;  ///< standard deviations
   unsigned long seed = 1;
+  bool interval = false;
   std::string out;
   files::ReadOptions reading;
   Output output;
@@ -43,7 +48,8 @@ struct SimulationRun {
   files::CellFile cell;
   measurement::Recording recording;
   std::vector<host_sim::SimulatedRow> rows;
-  std::vector<SimulatedCell> cells;  ///< of a pack recording
+  std::vector<SimulatedCell> cells;                            ///< of a pack recording
+  std::optional<diagnosis::PredictionInterval> interval = {};  ///< with --interval
   host_sim::SimulationResult result;
 };
 
@@ -111,6 +117,10 @@ SimulationRun read(const SimulateOptions& options) {
   print_read_as(options.output, run.recording);
   measurement::compare_with_cell(run.recording, run.cell.parameters);
   refuse_contradiction(run.recording);
+  if (options.interval && !run.recording.cell_voltage_v.empty())
+    throw files::BadInput(
+        "--interval", 1,
+        "not for the recording of a pack, expected that of one cell; --map voltage_v=v_1 reads a cell");
   if (bursts_unknown(run.cell)) {
     run.recording.warnings.push_back(
         {"bursts_unknown", "contact_intermittent has no effect: a cell file does not contain the times of its bursts"});
@@ -164,12 +174,31 @@ void compute(const SimulateOptions& options, SimulationRun& run) {
                 .warnings = run.recording.warnings};
 }
 
+/// The interval of the voltage from a start that is known to the tolerance of the cell file.
+void add_interval(const SimulateOptions& options, SimulationRun& run) {
+  const measurement::Recording& r = run.recording;
+  const workflow::StartSoc start = workflow::given_start(run.cell, options.initial_soc);
+  const bool measured = !r.voltage_v.empty();
+  diagnosis::PreparedRecording record{.name = options.input(),
+                                      .time_s = r.time_s,
+                                      .current_a = r.current_a,
+                                      .voltage_v = measured ? r.voltage_v : std::vector(r.rows(), std::nan("")),
+                                      .temperature_c = r.temperature_c,
+                                      .initial_soc = start.soc,
+                                      .initial_soc_sigma = start.sigma};
+  std::vector<double> voltage_v;
+  for (const host_sim::SimulatedRow& row : run.rows) voltage_v.push_back(row.voltage_v);
+  run.interval =
+      diagnosis::prediction_interval(run.cell.parameters, run.cell.mechanisms, record, voltage_v, run.cell.healthy);
+}
+
 std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
   const measurement::Recording& r = run.recording;
   host_sim::GaussianNoise noise(options.seed);
   const bool temperature = !r.temperature_c.empty();  // a replay needs it, because mechanisms depend on it
   std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c" : "time_s,current_a,voltage_v,soc";
   for (const SimulatedCell& cell : run.cells) fmt::format_to(std::back_inserter(csv), ",v_{}", cell.number);
+  if (run.interval) csv += ",voltage_std_v";
   csv += '\n';
   csv.reserve(run.rows.size() * 48);
   for (std::size_t k = 0; k < run.rows.size(); ++k) {
@@ -181,6 +210,7 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
     if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
     for (const SimulatedCell& cell : run.cells)
       fmt::format_to(std::back_inserter(csv), ",{:.10g}", cell.voltage_v[k] + options.noise_v * noise.next());
+    if (run.interval) fmt::format_to(std::back_inserter(csv), ",{:.4g}", run.interval->sigma_v[k]);
     csv += '\n';
   }
   return csv;
@@ -199,6 +229,11 @@ files::PageContent page_content(const SimulationRun& run) {
     voltage.columns[0].push_back(row.voltage_v);
     soc.columns[0].push_back(100 * row.soc);
   }
+  if (run.interval) {
+    voltage.labels[0] = "simulated with its 95 % interval, V";
+    voltage.half_band.resize(voltage.columns.size());
+    for (const double v : run.interval->sigma_v) voltage.half_band[0].push_back(diagnosis::half_width_sigmas * v);
+  }
   return {"Simulation of " + run.result.input.substr(run.result.input.rfind('/') + 1),
           "Cell " + run.result.cell + ", open loop.",
           {},
@@ -206,17 +241,28 @@ files::PageContent page_content(const SimulationRun& run) {
           {voltage, current, soc}};
 }
 
+/// Of the measured voltage; nothing without one or without --interval.
+std::optional<diagnosis::Coverage> coverage_of(const SimulationRun& run) {
+  if (!run.interval || run.interval->coverage.readings() == 0) return std::nullopt;
+  return run.interval->coverage;
+}
+
 void write(const SimulateOptions& options, const SimulationRun& run) {
   write_output(options.out, csv_of(options, run));
-  if (!options.output.json.empty())
-    write_output(options.output.json, run.cells.empty() ? reports::json_of(run.result)
-                                                        : with_cells(reports::json_of(run.result), run.cells));
+  const std::optional<diagnosis::Coverage> coverage = coverage_of(run);
+  if (!options.output.json.empty()) {
+    const std::string json = reports::json_of(run.result, coverage);
+    write_output(options.output.json, run.cells.empty() ? json : with_cells(json, run.cells));
+  }
   if (!options.output.report.empty()) write_output(options.output.report, reports::page_of(page_content(run)));
   if (options.out == "-") return;
   print_summary(options.output, fmt::format("{} rows in {}: from {:.1f} % to {:.1f} % state of charge in {:.2f} h.",
                                             run.rows.size(), options.out, 100 * options.initial_soc,
                                             100 * run.result.final_soc, run.result.duration_s / 3'600));
   if (!run.cells.empty()) print_summary(options.output, cells_text(run.cells));
+  if (coverage)
+    print_summary(options.output,
+                  diagnosis::sentence_of(*coverage, options.input().substr(options.input().rfind('/') + 1)));
 }
 
 class SimulateCommand final : public Command {
@@ -243,6 +289,9 @@ class SimulateCommand final : public Command {
     c.add_option("--noise-a", o_.noise_a, "standard deviation in A of noise added to the current in the output")
         ->check(Within(0.0, 1e6));
     c.add_option("--seed", o_.seed, "seed of the noise")->capture_default_str();
+    c.add_flag("--interval", o_.interval,
+               "add the column voltage_std_v, the standard deviation of a healthy cell's reading around the simulated "
+               "voltage: 1.96 times it contains 95 % of the readings; not for the recording of a pack");
     c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc; of a pack also v_1 to v_N")
         ->required()
         ->type_name("FILE");
@@ -260,6 +309,7 @@ class SimulateCommand final : public Command {
     if (o_.initial_soc_given->count() == 0 && !known.empty() && known.front() >= 0 && known.front() <= 1)
       o_.initial_soc = known.front();
     compute(o_, run);
+    if (o_.interval) add_interval(o_, run);
     write(o_, run);
     return 0;
   }

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "files/bad_input.hpp"
+#include "measurement/in_parallel.hpp"
 #include "tool/commands.hpp"
 #include "tool/output.hpp"
 #include "tool/progress.hpp"
@@ -141,6 +142,10 @@ int main(int argc, char** argv) {
   app.name("bms");
   app.require_subcommand(1);
   app.set_version_flag("--version", BMS_VERSION);
+  app.add_option_function<int>("--processors", bms::measurement::use_processors,
+                               "processors that a command uses at most, before its name (default: all)")
+      ->envname("BMS_PROCESSORS")
+      ->check(CLI::PositiveNumber);
   app.footer(
       "bms COMMAND --help shows the options of a command.\n"
       "Conventions: a current above 0 charges the cell; a state of charge is a fraction from 0 to 1.");

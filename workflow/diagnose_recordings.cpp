@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/courses_among.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "diagnosis/reference.hpp"
@@ -17,6 +18,7 @@
 #include "measurement/recording_checks.hpp"
 #include "workflow/diagnosis_comparison.hpp"
 #include "workflow/likeliest_start.hpp"
+#include "workflow/next_steps.hpp"
 
 namespace bms::workflow {
 
@@ -143,7 +145,7 @@ RecordingComparison prepared(measurement::Recording r, const std::string& name, 
                                       .initial_soc_given = start.given,
                                       .checks = {}};
   diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
-  return {std::move(r), std::move(record), {}, {}};
+  return {std::move(r), std::move(record), {}, {}, {}};
 }
 
 DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
@@ -188,16 +190,30 @@ DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options
   r.baseline_holdout = figures(r.holdouts, &RecordingComparison::base_v);
   r.extended_holdout = figures(r.holdouts, &RecordingComparison::extended_v);
   r.extended_cell = extended_cell(r);
+  add_intervals(r);
   r.soc = soc_errors(r);
   r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return r;
 }
 
-void add_next_experiment(DiagnoseResult& r) {
+void add_next_experiment(const DiagnoseOptions& options, DiagnoseResult& r) {
   if (!r.named()) return;
+  std::vector<diagnosis::PreparedRecording> records;
+  for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
   const bool temperature = std::any_of(r.recordings.begin(), r.recordings.end(),
                                        [](const RecordingComparison& c) { return !c.record.temperature_c.empty(); });
-  r.next = diagnosis::next_experiment(r.cell.parameters, r.diagnosis, temperature);
+  r.next = diagnosis::next_experiment(r.cell.parameters, r.diagnosis, temperature,
+                                      diagnosis::courses_among(records, r.cell.parameters.capacity_ah));
+  if (r.next) {
+    r.then = joint_command(options, r.recordings, *r.next);
+    return;
+  }
+  r.nothing_more = diagnosis::nothing_more_text(r.diagnosis);
+  std::string& statement = r.diagnosis.statement;
+  if (!r.nothing_more.empty() && statement.ends_with(diagnosis::another_experiment)) {
+    statement.resize(statement.size() - diagnosis::another_experiment.size());
+    statement += "No other experiment would.";
+  }
 }
 
 void add_holdout_warnings(DiagnoseResult& r) {

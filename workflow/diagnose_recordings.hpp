@@ -53,8 +53,9 @@ DiagnoseInput read_diagnose_input(const DiagnoseOptions& options);
 /// and `out` empty.
 DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options& options);
 
-/// Chooses the experiment that separates the causes that are still possible, if the verdict names mechanisms.
-void add_next_experiment(DiagnoseResult& result);
+/// Chooses the experiment that separates the causes that are still possible, if the verdict names mechanisms: one that
+/// is not among the recordings. Without one it says so. options: those of this diagnosis.
+void add_next_experiment(const DiagnoseOptions& options, DiagnoseResult& result);
 
 /// Adds a warning if the findings increase an error on the hold-outs.
 void add_holdout_warnings(DiagnoseResult& result);

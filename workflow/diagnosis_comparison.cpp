@@ -38,30 +38,52 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
   return ids;
 }
 
+/// Mechanisms of the extended model in a recording. later: a hold-out.
+std::vector<model::MechanismSetting> extended_settings(const DiagnoseResult& r, const RecordingComparison& c,
+                                                       bool later) {
+  if (later && r.named()) return diagnosis::later_recording(r.diagnosis.extended, c.record.initial_soc);
+  if (r.has_term()) return diagnosis::with_term(r.cell.mechanisms, *r.diagnosis.law);
+  return r.named() ? r.diagnosis.extended.settings : r.cell.mechanisms;
+}
+
 }  // namespace
 
 void compare(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
   const auto simulate = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
                             std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into,
-                            bool later = false) {
+                            bool extended) {
+    const bool later = &list == &r.holdouts;
     for (RecordingComparison& c : list) {
       diagnosis::Hypothesis here = h;
       here.bursts.clear();
-      if (&list == &r.recordings && h.bursts.size() == list.size())
+      if (!later && h.bursts.size() == list.size())
         here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
       const diagnosis::LikelihoodModel likelihood(cell, own, {c.record}, {});
-      if (later) here.settings = diagnosis::later_recording(r.diagnosis.extended, c.record.initial_soc);
+      if (extended) here.settings = extended_settings(r, c, later);
       c.*into = likelihood.voltage(here, likelihood.unchanged(), 0);
     }
   };
-  const diagnosis::Hypothesis base{own, own.size(), {}};
-  diagnosis::Hypothesis extended = r.named() ? r.diagnosis.extended : base;
-  if (r.has_term()) extended.settings = diagnosis::with_term(own, *r.diagnosis.law);
-  simulate(r.cell.parameters, base, r.recordings, &RecordingComparison::base_v);
-  simulate(r.cell.parameters, base, r.holdouts, &RecordingComparison::base_v);
-  simulate(r.diagnosis.cell, extended, r.recordings, &RecordingComparison::extended_v);
-  simulate(r.diagnosis.cell, extended, r.holdouts, &RecordingComparison::extended_v, r.named());
+  const diagnosis::Hypothesis base{own, own.size(), {}}, extended = r.named() ? r.diagnosis.extended : base;
+  for (auto* list : {&r.recordings, &r.holdouts}) {
+    simulate(r.cell.parameters, base, *list, &RecordingComparison::base_v, false);
+    simulate(r.diagnosis.cell, extended, *list, &RecordingComparison::extended_v, true);
+  }
+}
+
+void add_intervals(DiagnoseResult& r) {
+  for (auto* list : {&r.recordings, &r.holdouts}) {
+    for (RecordingComparison& c : *list)
+      c.interval =
+          diagnosis::prediction_interval(r.extended_cell.parameters, extended_settings(r, c, list == &r.holdouts),
+                                         c.record, c.extended_v, r.cell.healthy);
+  }
+}
+
+std::optional<diagnosis::Coverage> coverage(const std::vector<RecordingComparison>& list) {
+  diagnosis::Coverage all;
+  for (const RecordingComparison& c : list) all.add(c.record.voltage_v, c.extended_v, c.interval.sigma_v);
+  return all.readings() > 0 ? std::optional(all) : std::nullopt;
 }
 
 std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,

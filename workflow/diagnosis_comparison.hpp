@@ -9,6 +9,12 @@ namespace bms::workflow {
 /// hold-outs.
 void compare(DiagnoseResult& r);
 
+/// Adds the intervals around extended_v. Needs the extended cell.
+void add_intervals(DiagnoseResult& r);
+
+/// Readings of several recordings together within their intervals; nothing if no row has a voltage.
+std::optional<diagnosis::Coverage> coverage(const std::vector<RecordingComparison>& list);
+
 /// Figures of several recordings together; nothing if no row has a voltage.
 std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& list,
                                        std::vector<double> RecordingComparison::*simulated);

@@ -7,6 +7,7 @@
 
 #include "diagnosis/diagnose.hpp"
 #include "diagnosis/next_experiment.hpp"
+#include "diagnosis/prediction_interval.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 
@@ -27,6 +28,7 @@ struct RecordingComparison {
   measurement::Recording recording;
   diagnosis::PreparedRecording record;
   std::vector<double> base_v, extended_v;  ///< open loop, by row
+  diagnosis::PredictionInterval interval;  ///< around extended_v
 };
 
 struct DiagnoseResult {
@@ -36,6 +38,8 @@ struct DiagnoseResult {
   std::optional<OpenLoopFigures> baseline, extended, baseline_holdout, extended_holdout;
   std::optional<SocErrors> soc;                   ///< of the hold-outs with a reference
   std::optional<diagnosis::NextExperiment> next;  ///< separates the causes that are still possible
+  std::string then;                               ///< command that diagnoses its recording together with these
+  std::string nothing_more;                       ///< why there is no next one, where causes are still ambiguous
   std::string out;
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;

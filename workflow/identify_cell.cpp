@@ -296,11 +296,10 @@ void check_reference(const files::CellFile& cell, double identified_c, bool move
 /// One fit over all recordings, and the prediction of those that were held out.
 void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs, IdentifyResult& result,
                             files::CellFile& cell) {
-  const double capacity_ah = cell.parameters.capacity_ah;
   std::vector<id::JointRecording> recordings;
   for (std::size_t k = 0; k < inputs.measured.size(); ++k) {
     const IdentificationData& of = inputs.measured[k];
-    recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, capacity_ah));
+    recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, cell.parameters.capacity_ah));
   }
   JointResult joint = options.circuit ? identified_again(*options.circuit, recordings)
                                       : identify_jointly(cell, covers_both_directions(recordings), recordings);
@@ -391,6 +390,8 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
     cell.healthy = learn_healthy(options, cell, result.joint, result.warnings);
     cell.sources["healthy"] = healthy_summary(cell.healthy) + "; each diagnosed with a cell identified without it";
   }
+  if (result.cell_file && result.joint)
+    add_coverage(options.hold_out, options.reading, options.initial_soc.value, *result.cell_file, *result.joint);
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

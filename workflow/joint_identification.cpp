@@ -9,6 +9,7 @@
 
 #include "files/bad_input.hpp"
 #include "host_sim/simulation.hpp"
+#include "workflow/diagnose_recordings.hpp"
 
 namespace bms::workflow {
 
@@ -147,6 +148,19 @@ void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& r
     const IdentificationData of = identification_data(recording, options);
     const auto r = joint_recording(recording, of, of.record.initial_soc, joint.choice.model.cell.capacity_ah);
     joint.held_out.push_back(id::left_out_error(joint.choice.model, r, {}));
+  }
+}
+
+void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading,
+                  const std::optional<double>& initial_soc, const files::CellFile& cell, JointResult& joint) {
+  for (const std::string& path : paths) {
+    measurement::Recording recording = read_for_diagnosis(path, reading, cell);
+    const StartSoc start = initial_soc ? given_start(cell, *initial_soc) : start_of(recording, cell);
+    const diagnosis::PreparedRecording record = prepared(std::move(recording), path, cell, start).record;
+    joint.coverage.push_back(
+        diagnosis::prediction_interval(cell.parameters, cell.mechanisms, record,
+                                       diagnosis::predict(cell.parameters, cell.mechanisms, record), cell.healthy)
+            .coverage);
   }
 }
 

@@ -2,9 +2,11 @@
 // chosen circuit, into the cell file, and to recordings that were held out.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "diagnosis/prediction_interval.hpp"
 #include "files/cell_file.hpp"
 #include "identification/identify.hpp"
 #include "identification/joint_structure.hpp"
@@ -19,6 +21,7 @@ struct JointResult {
   identification::StructureChoice choice;
   std::vector<std::string> recordings;                 ///< of the fit
   std::vector<identification::LeftOutError> held_out;  ///< of --hold-out
+  std::vector<diagnosis::Coverage> coverage;           ///< of the same, by the cell file; empty without one
   bool keeps_shape = false;                            ///< R0, R1, C1 over SOC are those of the grey box
   std::size_t temperatures = 1;                        ///< more than 5 K apart
 };
@@ -40,6 +43,11 @@ JointResult identified_again(const JointResult& joint, const std::vector<identif
 /// Predicts recordings that did not enter the fit.
 void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
               JointResult& joint);
+
+/// Adds how many readings of the recordings that were held out are within the cell file's 95 % interval. Each starts at
+/// initial_soc or, if not given, where a diagnosis would start.
+void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading,
+                  const std::optional<double>& initial_soc, const files::CellFile& cell, JointResult& joint);
 
 /// Unknowns at a bound, and a search that did not converge.
 std::vector<measurement::Warning> warnings_of(const JointResult& joint);

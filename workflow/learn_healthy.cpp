@@ -115,7 +115,7 @@ class Learning {
       data_.beyond_tolerance_v = in_short(regimes_.beyond_tolerance_v(usable));
     }
     for (measurement::HealthyRegime& r : data_.regimes) {
-      for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v, &r.high_v}) *v = in_short(*v);
+      for (double* v : {&r.hours, &r.bias_v, &r.rms_v, &r.spread_v}) *v = in_short(*v);
     }
     return std::move(data_);
   }

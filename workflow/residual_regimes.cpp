@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/thresholds.hpp"
@@ -73,14 +74,12 @@ void ResidualRegimes::add_block(std::size_t recording, const diagnosis::Prepared
 
 std::vector<measurement::HealthyRegime> ResidualRegimes::regimes(const std::vector<char>& kept) const {
   std::map<std::pair<std::size_t, std::size_t>, std::vector<Sum>> all;
-  std::map<std::pair<std::size_t, std::size_t>, std::map<std::size_t, Sum>> parts;
+  std::map<std::pair<std::size_t, std::size_t>, std::set<std::size_t>> parts;
   for (std::size_t b = 0; b < blocks_.size(); ++b) {
     if (!kept.empty() && kept[b] == 0) continue;
     for (const auto& [place, sum] : blocks_[b].sums) {
       all[place].push_back(sum);
-      Sum& part = parts[place][part_of(b)];
-      part.count += sum.count;
-      part.squares += sum.squares;
+      parts[place].insert(part_of(b));
     }
   }
   std::vector<measurement::HealthyRegime> list;
@@ -99,18 +98,9 @@ std::vector<measurement::HealthyRegime> ResidualRegimes::regimes(const std::vect
     for (const Sum& s : sums) r.spread_v += (s.sum_v / s.count - r.bias_v) * (s.sum_v / s.count - r.bias_v);
     r.spread_v = std::sqrt(r.spread_v / std::max<double>(static_cast<double>(sums.size()) - 1, 1));
     r.parts = static_cast<double>(parts[place].size());
-    r.high_v = high_v(parts[place]);
     list.push_back(r);
   }
   return list;
-}
-
-double ResidualRegimes::high_v(const std::map<std::size_t, Sum>& parts) {
-  const auto n = static_cast<double>(parts.size());
-  double mean = 0, variance = 0;
-  for (const auto& [part, sum] : parts) mean += sum.squares / sum.count / n;
-  for (const auto& [part, sum] : parts) variance += std::pow(sum.squares / sum.count - mean, 2) / std::max(n - 1, 1.0);
-  return std::sqrt(mean + std::sqrt(variance));
 }
 
 double ResidualRegimes::beyond_tolerance_v(const std::vector<char>& kept) const {
@@ -122,7 +112,7 @@ double ResidualRegimes::beyond_tolerance_v(const std::vector<char>& kept) const 
     part.squares += blocks_[b].squares;
     part.expected += blocks_[b].expected;
   }
-  double sum = 0, weights = diagnosis::thresholds.healthy.tolerance_counts;
+  double sum = 0, weights = diagnosis::thresholds.healthy.as_expected;
   for (const auto& [part, total] : parts) {
     sum += std::max(total.squares - total.expected, 0.0) / total.rows;
     ++weights;

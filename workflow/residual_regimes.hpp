@@ -34,7 +34,6 @@ class ResidualRegimes {
     double rows = 0, squares = 0, expected = 0;               ///< squares: of the error; expected: by the cell file
   };
 
-  static double high_v(const std::map<std::size_t, Sum>& parts);
   /// The recording of a block; of a single recording, the block.
   std::size_t part_of(std::size_t block) const;
 

@@ -29,6 +29,14 @@ struct Knowledge<model::CapacityChange> : DefaultKnowledge<model::CapacityChange
   static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts&) {
     return {{-0.1}, {0.04}, {0.08}, {0.14}, {0.2}, {0.28}};
   }
+  /// A cell does not age so: much of its capacity is gone, its resistance is as it was.
+  static bool is_implausible(const MechanismSetting& s, const std::vector<MechanismSetting>& all,
+                             const RecordingFacts&) {
+    constexpr const Thresholds::Decision& limits = thresholds.decision;
+    return s.value[0] > limits.capacity_lost_alone &&
+           first_strength(all, model::mechanism_index_of<model::ResistanceGrowth>) < limits.resistance_grown &&
+           first_strength(all, model::mechanism_index_of<model::PolarisationGrowth>) < limits.resistance_grown;
+  }
   static double capacity_share(const MechanismSetting& s) { return 1 - s.value[0]; }
   /// Acts together with the calibration's own change of capacity.
   template <class S>

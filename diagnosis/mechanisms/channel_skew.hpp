@@ -1,6 +1,8 @@
 // A time skew of the channels: seen at the edges of the current, so there must be some.
 #pragma once
 
+#include <cmath>
+
 #include <fmt/format.h>
 
 #include "diagnosis/mechanism.hpp"
@@ -29,6 +31,11 @@ struct Knowledge<model::ChannelSkew> : DefaultKnowledge<model::ChannelSkew> {
   static std::optional<std::string> not_testable(const TestConditions& c) {
     if (c.facts.edges < edges_needed || c.facts.step_s > slowest_step_s) return "too few steps of the current";
     return std::nullopt;
+  }
+  /// Less than what the noise model grants each reading next to an edge of the current.
+  static bool is_implausible(const MechanismSetting& s, const std::vector<MechanismSetting>&,
+                             const RecordingFacts& facts) {
+    return std::abs(s.value[0]) < thresholds.noise.edge_jitter * facts.step_s;
   }
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& value) {

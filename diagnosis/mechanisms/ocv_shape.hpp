@@ -30,6 +30,13 @@ struct Knowledge<model::OcvShape> : DefaultKnowledge<model::OcvShape> {
   static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts&) {
     return {{-0.06, -0.06}, {-0.03, -0.03}, {0.03, 0.03}, {0.06, 0.06}, {0.06, -0.06}, {-0.06, 0.06}};
   }
+  /// A cell does not age so: the stages of its OCV lie closer together, its capacity is as it was.
+  static bool is_implausible(const MechanismSetting& s, const std::vector<MechanismSetting>& all,
+                             const RecordingFacts&) {
+    constexpr const Thresholds::Decision& limits = thresholds.decision;
+    const double closer = (s.value[0] - s.value[1]) / limits.slides_apart_soc;
+    return closer - first_strength(all, model::mechanism_index_of<model::CapacityChange>) > limits.stages_closer;
+  }
 };
 
 }  // namespace bms::diagnosis

@@ -172,6 +172,7 @@
     key(cell_colour, 'cell file');
     if (report.named) key(blue, 'extended');
     if (report.floor_mv > 0) draw(s, 'text', {x: from, y: y}, '\u2506 noise floor ' + mv(report.floor_mv));
+    for (const text of report.intervals) make(box, 'p', text, 'why');
     if (report.has_holdout || !report.named) return;
     const p = make(box, 'p', 'There was no hold-out recording. To check the result, give a later one with ', 'why');
     make(p, 'code', '--holdout');
@@ -247,7 +248,7 @@
       draw_share(box);
     else if (report.error_mv !== null)
       make(box, 'p', mv(report.error_mv) + ' RMS between recording and cell file' + floor_text + '.', 'why');
-    if (next) make(box, 'p', [next.why, next.instruction, next.command].join(' '), 'action');
+    for (const step of next) make(box, 'p', step, 'action');
     for (const m of report.mechanisms) {
       const p = make(box, 'p', undefined, 'action');
       make(p, 'b', title_of(m.name) + ': ');
@@ -289,9 +290,17 @@
   const chart = (c, title, columns, tall) => {
     const box = make(get('curves'), 'figure'), caption = make(box, 'figcaption', title + ' ');
     const legend = make(caption, 'span', '', 'legend');
-    const rows = c.time_s.map((t, k) => [t / 3600, ...columns.map(column => column.values[k])]);
+    const bands = columns.some(column => column.half);
+    const value = (column, k) => {
+      const v = column.values[k];
+      if (!bands) return v;
+      const half = column.half ? column.half[k] : 0;
+      return v === null ? [null, null, null] : [v - half, v, v + half];
+    };
+    const rows = c.time_s.map((t, k) => [t / 3600, ...columns.map(column => value(column, k))]);
     return new Dygraph(make(box, 'div', undefined, tall ? 'chart tall' : 'chart'), rows, {
       labels: ['time', ...columns.map(column => column.label)],
+      customBars: bands,
       labelsDiv: legend,
       legend: 'always',
       colors: columns.map(column => column.colour),
@@ -314,6 +323,11 @@
         volts.push({label: 'extended, V', values: c.extended_v, colour: blue});
         errors.push({label: 'extended, mV', values: c.after_mv, colour: blue});
       }
+      if (c.half_width_v) {
+        const last = volts[volts.length - 1], half = c.half_width_v.map(v => 1e3 * v);
+        Object.assign(last, {label: last.label.replace(',', ' with its 95 % interval,'), half: c.half_width_v});
+        errors.unshift({label: '95 % interval, mV', values: half.map(() => 0), half: half, colour: grey});
+      }
       volts.push({label: 'measured, V', values: c.measured_v, colour: dark});
       const pair = [
         chart(c, 'Voltage, open loop: ' + name, volts, true),
@@ -332,6 +346,7 @@
     draw_unexplained();
     learned_law(get('figure-law'), get('law'));
     draw_regimes();
+    isolability(get('figure-isolability'), get('isolability'));
     draw_limits();
   };
   draw_head();

@@ -129,6 +129,31 @@ TEST(Tables, EveryMethodHasAColumnAndEveryConfusionARow) {
   EXPECT_THAT(text, HasSubstr("| (outside the catalogue) | 1 | 1 |  |"));
 }
 
+TEST(Tables, AmbiguousDiagnosesCountByHowTheirExperimentsEnd) {
+  Round open{
+      .profile = "shunt_check", .verdict = diagnosis::Verdict::ambiguous, .sets = {{"leakage", "current_offset"}}},
+      found{.profile = "full_cycle", .verdict = diagnosis::Verdict::cause, .sets = {{"leakage"}}};
+  std::vector<Outcome> outcomes(5);  // right by the second; wrong at once; stuck; right at once; not ambiguous
+  outcomes[0].next = {.rounds = {open, found}, .decided = true, .right = true};
+  outcomes[1].next = {.rounds = {found}, .decided_at_once = true, .decided = true};
+  outcomes[2].next = {.rounds = {open}, .nothing_more = true};
+  outcomes[3].next = {
+      .rounds = {found}, .decided_at_once = true, .right_at_once = true, .decided = true, .right = true};
+  const Score s = score(outcomes);
+  EXPECT_EQ(s.decided_at_once.hits, 2U);
+  EXPECT_EQ(s.right_at_once.hits, 1U);
+  EXPECT_EQ(s.decided.hits, 3U);
+  EXPECT_EQ(s.decided.of, 4U);
+  EXPECT_EQ(s.right.hits, 2U);
+  EXPECT_EQ(s.right.of, 3U);
+  EXPECT_EQ(s.nothing_more.hits, 1U);
+  EXPECT_NEAR(s.mean_experiments, 5.0 / 4, 1e-12);
+  EXPECT_STREQ(end_of(*outcomes[0].next), "right");
+  EXPECT_STREQ(end_of(*outcomes[1].next), "WRONG");
+  EXPECT_STREQ(end_of(*outcomes[2].next), "nothing more can be learned");
+  EXPECT_STREQ(end_of({}), "no experiment");
+}
+
 TEST(Tables, AReadmeKeepsTheTextAroundTheTables) {
   const files::TemporaryFolder folder;
   const std::filesystem::path readme = folder.path() / "README.md";

@@ -49,5 +49,18 @@ TEST(SemiReal, FaultsBeyondTheBoundsStandApart) {
   EXPECT_EQ(by_size({{}}), "") << "healthy recordings alone";
 }
 
+TEST(SemiReal, ProbabilitiesAreComparedWithHowOftenTheyComeTrue) {
+  std::vector<SemiRealResult> all(10, result(4, true, "CAUSE"));
+  for (SemiRealResult& r : all) {
+    r.probability = 0.9;
+    r.is_the_fault = true;
+  }
+  all.back().fault = "";  // a null that was blamed
+  all.back().is_the_fault = false;
+  EXPECT_THAT(table_of(all), testing::HasSubstr("expected calibration error | 9 of 10; 0.90; 0.00 | - |\n"));
+  for (std::size_t k = 0; k < 5; ++k) all[k].is_the_fault = false;
+  EXPECT_THAT(table_of(all), testing::HasSubstr("expected calibration error | 4 of 10; 0.90; 0.50 | - |\n"));
+}
+
 }  // namespace
 }  // namespace bms::benchmark

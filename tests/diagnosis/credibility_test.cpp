@@ -17,12 +17,14 @@ TEST(Credibility, ASkewWithinTheJitterOfAnEdgeIsNone) {
   constexpr std::size_t skew = model::mechanism_index_of<model::ChannelSkew>,
                         offset = model::mechanism_index_of<model::CurrentOffset>;
   for (const double step_s : {0.1, 1.0, 10.0}) {
+    RecordingFacts facts;
+    facts.step_s = step_s;
     const double edge_s = thresholds.noise.edge_jitter * step_s;
     for (const double sign : {-1.0, 1.0}) {
-      EXPECT_TRUE(is_within_jitter(with_first(skew, sign * 0.9 * edge_s), skew, step_s)) << step_s;
-      EXPECT_FALSE(is_within_jitter(with_first(skew, sign * 1.1 * edge_s), skew, step_s)) << step_s;
+      EXPECT_TRUE(is_implausible(with_first(skew, sign * 0.9 * edge_s), skew, facts)) << step_s;
+      EXPECT_FALSE(is_implausible(with_first(skew, sign * 1.1 * edge_s), skew, facts)) << step_s;
     }
-    EXPECT_FALSE(is_within_jitter(with_first(offset, 0.9 * edge_s), offset, step_s));
+    EXPECT_FALSE(is_implausible(with_first(offset, 0.9 * edge_s), offset, facts));
   }
 }
 
@@ -36,12 +38,27 @@ TEST(Credibility, StagesOfTheOcvComeCloserTogetherWithTheCapacityAlone) {
     return f;
   };
   HypothesisFit f = slid(0.03, 0.03 - 1.1 * closer * apart);
-  EXPECT_TRUE(is_implausible(f, shape));
-  EXPECT_FALSE(is_implausible(slid(0.03, 0.03 - 0.9 * closer * apart), shape));
-  EXPECT_FALSE(is_implausible(slid(-0.08, 0.08), shape)) << "a lost electrode spreads them";
-  EXPECT_FALSE(is_implausible(slid(0.1, 0.1), shape)) << "lost lithium moves both";
+  EXPECT_TRUE(is_implausible(f, shape, {}));
+  EXPECT_FALSE(is_implausible(slid(0.03, 0.03 - 0.9 * closer * apart), shape, {}));
+  EXPECT_FALSE(is_implausible(slid(-0.08, 0.08), shape, {})) << "a lost electrode spreads them";
+  EXPECT_FALSE(is_implausible(slid(0.1, 0.1), shape, {})) << "lost lithium moves both";
   f.hypothesis.settings.push_back({capacity, {0.5 * closer}, {}});
-  EXPECT_FALSE(is_implausible(f, shape)) << "the capacity is lost as well";
+  EXPECT_FALSE(is_implausible(f, shape, {})) << "the capacity is lost as well";
+}
+
+TEST(Credibility, MuchCapacityIsLostWithResistanceAlone) {
+  constexpr std::size_t capacity = model::mechanism_index_of<model::CapacityChange>;
+  const double lost = thresholds.decision.capacity_lost_alone, grown = thresholds.decision.resistance_grown;
+  EXPECT_TRUE(is_implausible(with_first(capacity, 1.1 * lost), capacity, {}));
+  EXPECT_FALSE(is_implausible(with_first(capacity, 0.9 * lost), capacity, {}));
+  for (const std::size_t m :
+       {model::mechanism_index_of<model::ResistanceGrowth>, model::mechanism_index_of<model::PolarisationGrowth>}) {
+    HypothesisFit f = with_first(capacity, 1.1 * lost);
+    f.hypothesis.settings.push_back({m, {0.9 * grown}, {}});
+    EXPECT_TRUE(is_implausible(f, capacity, {})) << m;
+    f.hypothesis.settings.back().value[0] = 1.1 * grown;
+    EXPECT_FALSE(is_implausible(f, capacity, {})) << m;
+  }
 }
 
 PreparedRecording of_1200_s() {

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "diagnosis/diagnose.hpp"
-#include "diagnosis/predicted_band.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/sensor_end.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
@@ -45,62 +44,6 @@ TEST(DetectionLimits, WithHealthyRecordingsASizeStandsOutFromThem) {
 
 TEST(DetectionLimits, BeyondTheBoundsNoneIsStated) {
   EXPECT_THAT(limits_of({{offset, 1.0}}, leaves(0), 6, {}), IsEmpty());
-}
-
-TEST(PredictedBand, HoldsAHealthyRecordingAndNotAWrongVoltage) {
-  const auto share_within = [](double add_v, const measurement::HealthyData& healthy = {}) {
-    const PreparedRecording r = test::recorded(test::drive(1, 21), 0.7, 21, [&](auto...) { return add_v; });
-    const LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, {r});
-    const std::vector<double> sigma_v = predicted_sigma_v(likelihood, 0, healthy),
-                              file_v = likelihood.voltage(likelihood.base(), likelihood.unchanged(), 0);
-    double within = 0;
-    for (std::size_t k = 0; k < r.size(); ++k)
-      within += std::abs(r.voltage_v[k] - file_v[k]) <= 1.96 * sigma_v[k] ? 1 : 0;
-    return within / static_cast<double>(r.size());
-  };
-  EXPECT_GT(share_within(0), 0.9);
-  EXPECT_LT(share_within(0.05), 0.2);
-  measurement::HealthyData healthy;
-  healthy.regimes = {{"soc", 0, 1, 2, 0, 0.05, 0.01, 2, 0.05}};
-  EXPECT_GT(share_within(0.05, healthy), 0.9) << "healthy recordings were as wrong";
-}
-
-/// The band's standard deviation in a discharge from 70 to 66 %, and that of the cell file alone [V].
-std::array<double, 2> band_and_file_v(const measurement::HealthyData& healthy) {
-  std::vector<double> current_a(200, 0.0);
-  current_a.resize(400, -6.0);
-  const LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, {test::recorded(current_a, 0.7, 21)});
-  return {predicted_sigma_v(likelihood, 0, healthy)[350], predicted_sigma_v(likelihood, 0)[350]};
-}
-
-measurement::HealthyBlock up_to(double current_a) {
-  measurement::HealthyBlock block;
-  block.current_a = {-current_a, 0};
-  return block;
-}
-
-TEST(PredictedBand, WeighsHealthyRecordingsAgainstTheCellFile) {
-  measurement::HealthyData healthy;
-  healthy.regimes = {{"soc", 0.6, 0.8, 1, 0, 0.02, 0, 3, 0.03}};
-  const auto [band_v, file_v] = band_and_file_v(healthy);
-  // two of three predicted the third: 1 + 1/2 of a recording's variance; three predict the next one: 1 + 1/3
-  const double of_three_v2 = 0.03 * 0.03 * (1 + 1.0 / 3) / (1 + 1.0 / 2);
-  EXPECT_NEAR(band_v, std::sqrt((file_v * file_v + 3 * of_three_v2) / 4), 1e-9) << "three recordings and the file";
-  healthy.regimes = {{"soc", 0.6, 0.8, 1, 0, 0.02, 0, 1, 0.03}};
-  EXPECT_NEAR(band_and_file_v(healthy)[0], std::sqrt((file_v * file_v + 0.03 * 0.03) / 2), 1e-9);
-}
-
-TEST(PredictedBand, IsWiderWhereNoHealthyRecordingWas) {
-  measurement::HealthyData healthy;
-  healthy.regimes = {{"soc", 0, 0.5, 1, 0, 0.02, 0, 3, 0.03}};
-  healthy.beyond_tolerance_v = 0.01;
-  const auto [band_v, file_v] = band_and_file_v(healthy);
-  EXPECT_NEAR(band_v, std::hypot(1.5 * file_v, 0.01), 1e-9) << "they were below 50 %";
-  healthy.regimes = {{"soc", 0, 1, 1, 0, 0, 0, 3, 0}};
-  healthy.blocks = {up_to(5)};
-  EXPECT_NEAR(band_and_file_v(healthy)[0], file_v / 2, 1e-9) << "6 A is near 5 A";
-  healthy.blocks = {up_to(4)};
-  EXPECT_NEAR(band_and_file_v(healthy)[0], std::hypot(1.5 * file_v, 0.01), 1e-9) << "6 A is far from 4 A";
 }
 
 /// Rows of a drive whose current differs from row to row.

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "diagnosis/reference.hpp"
+#include "diagnosis/texts.hpp"
 #include "tests/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -78,6 +79,22 @@ TEST(NextExperiment, IsLaidOutForTheSmallestPossibleCapacity) {
   ASSERT_TRUE(next);
   EXPECT_LE(next->capacity_ah, 4.5);
   EXPECT_THAT(command(*next), testing::HasSubstr("--capacity-ah 4.5"));
+}
+
+TEST(NextExperiment, WhatHasBeenCarriedOutIsNotProposedAgain) {
+  const Diagnosis d = undecided({setting("leakage", {0.05}), setting("current_offset", {-0.05})}, 0.003);
+  const auto first = next_experiment(test::table9(), d, false);
+  ASSERT_TRUE(first);
+  const auto second = next_experiment(test::table9(), d, false, {first->profile});
+  ASSERT_TRUE(second);
+  EXPECT_NE(second->profile, first->profile);
+  std::vector<std::string> all;
+  for (const experiments::Experiment& e : experiments::experiments()) all.emplace_back(e.name);
+  EXPECT_FALSE(next_experiment(test::table9(), d, false, all)) << "nothing more can be learned";
+  const std::string text = nothing_more_text(d);
+  EXPECT_THAT(text, testing::StartsWith("No other experiment would distinguish a leakage from an offset of the current "
+                                        "sensor: nothing more can be learned"));
+  EXPECT_THAT(text, testing::HasSubstr("Zero the current sensor")) << "what to do instead";
 }
 
 TEST(NextExperiment, AFindingWithoutRivalsNeedsNoExperiment) {

@@ -2,7 +2,10 @@
 // readings.
 #include "diagnosis/trusted_readings.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -74,6 +77,52 @@ TEST(TrustedReadings, AContactIsNotInARecordingBeforeIt) {
   }
   EXPECT_LT(first, 0.01);
   EXPECT_GT(second, 0.1);
+}
+
+TEST(TrustedReadings, AGainIsNotReadOffWhereNoCurrentFlows) {
+  for (const double offset_a : {0.0, 0.02, 0.5}) {
+    PreparedRecording r = test::recorded(std::vector<double>(1'800, 0.0), 0.8, 1);
+    r.current_ref_a = std::vector<double>(r.size(), 0.0);  // the contactor is open
+    for (double& a : r.current_a.edit()) a += offset_a;
+    for (const InstrumentError& e : compare_instruments({r}, test::table9())) {
+      EXPECT_EQ(e.setting.index, model::mechanism_index_of<model::CurrentOffset>) << offset_a;
+      EXPECT_TRUE(std::isfinite(e.gain) && std::isfinite(e.setting.deviation[0]));
+    }
+  }
+}
+
+/// A finding with this mechanism, as its cause or a rival.
+bool suspects(const Diagnosis& d, std::size_t mechanism) {
+  return std::any_of(d.findings.begin(), d.findings.end(), [&](const Finding& f) {
+    return f.setting.index == mechanism ||
+           std::find(f.equivalent_to.begin(), f.equivalent_to.end(), mechanism) != f.equivalent_to.end();
+  });
+}
+
+/// A drive with the own current sensor alone, and a later one with an ammeter. The cell gets less than the own sensor
+/// reads: by the sensor's error, or by what flows inside the cell, where the ammeter does not read it either.
+Diagnosis of_two_drives(bool inside_cell) {
+  constexpr double less_a = 0.25;
+  std::vector<PreparedRecording> records;
+  for (const auto& [hours, seed] : {std::pair(2.0, 1U), std::pair(1.0, 2U)}) {
+    std::vector<double> into_cell_a = test::drive(hours, seed);
+    for (double& a : into_cell_a) a -= inside_cell ? less_a : 0;
+    PreparedRecording& r = records.emplace_back(test::recorded(into_cell_a, 0.8, seed));
+    const measurement::Column true_a = r.current_a;
+    for (double& a : r.current_a.edit()) a += less_a;
+    if (records.size() > 1) r.current_ref_a = inside_cell ? r.current_a : true_a;
+  }
+  return diagnose(test::table9(), {}, records);
+}
+
+TEST(TrustedReadings, AnAmmeterDecidesWhereTheMissingChargeOfAnEarlierRecordingGoes) {
+  constexpr std::size_t offset = model::mechanism_index_of<model::CurrentOffset>,
+                        leakage = model::mechanism_index_of<model::Leakage>;
+  const Diagnosis outside = of_two_drives(false), inside = of_two_drives(true);
+  EXPECT_NE(found(outside, offset), nullptr);
+  EXPECT_FALSE(suspects(outside, leakage));
+  EXPECT_NE(found(inside, leakage), nullptr) << name_of(inside.verdict);
+  EXPECT_FALSE(suspects(inside, offset));
 }
 
 TEST(TrustedReadings, InstrumentsThatAgreeAreNotBlamed) {

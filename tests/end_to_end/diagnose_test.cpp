@@ -81,6 +81,12 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
   EXPECT_GT(r["baseline"]["holdout"]["rmse_v"], 0.008);
   EXPECT_LT(r["extended"]["holdout"]["rmse_v"], 0.0013) << "1 mV of noise";
   EXPECT_LT(r["soc"]["extended_rmse"], r["soc"]["baseline_rmse"]);
+  // around the extended cell's voltage; the cell file's is off by up to 15 mV
+  EXPECT_EQ(r["coverage"]["nominal"], 0.95);
+  EXPECT_GT(r["coverage"]["recording"], 0.95);
+  EXPECT_GT(r["coverage"]["holdout"], 0.95);
+  EXPECT_EQ(r["coverage"]["holdout"], r["holdouts"][0]["coverage"]);
+  EXPECT_LT(r["holdouts"][0]["half_width_v"], 0.015);
   // the extended cell file works in other commands
   const std::string cell = content(path("x.toml"));
   EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
@@ -137,15 +143,36 @@ TEST_F(DiagnoseTool, TheShiftItselfHasNoMismatchAndLeavesTheCellUnchanged) {
   EXPECT_GT(r["detection_limits"].size(), 10U);
   EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("would have revealed"));
   EXPECT_TRUE(r["baseline"]["holdout"].is_null());
+  EXPECT_TRUE(r["coverage"]["holdout"].is_null());
+  EXPECT_GT(r["coverage"]["recording"], 0.95);
   EXPECT_EQ(r["baseline"]["recording"], r["extended"]["recording"]);
   EXPECT_THAT(content(path("x.toml")), HasSubstr("name = \"table9\"\n"));
   EXPECT_THAT(content(path("x.toml")), HasSubstr("NO_MISMATCH, nothing was added"));
 }
 
+TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
+  const auto rest = [&](const std::string& name, double above_v) {
+    return made(
+        name, 2'000, 1, [](int) { return 0.0; }, [&](int k) { return 3.286 + above_v + 0.001 * (k % 2); });
+  };
+  const ToolRun run =
+      run_tool("diagnose --cell table9 --initial-soc 0.5 --recording " + rest("now.csv", 0) + " --holdout " +
+               rest("same.csv", 0) + " " + rest("higher.csv", 0.1) + " --json " + path("r.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out,
+              HasSubstr("\nThe 95 % interval of the prediction contains 100.0 % of the readings of same.csv;"));
+  EXPECT_THAT(run.out,
+              HasSubstr("\nThe 95 % interval of the prediction contains 0.0 % of the readings of higher.csv;"));
+  const json r = json::parse(content(path("r.json")));
+  EXPECT_EQ(r["coverage"]["recording"], 1.0);
+  EXPECT_EQ(r["coverage"]["holdout"], 0.5) << "both together";
+  EXPECT_EQ(r["holdouts"][1]["coverage"], 0.0);
+}
+
 TEST_F(DiagnoseTool, HasAllFieldsOfTheContractForEveryVerdict) {
   const auto complete = [](const json& r) {
     for (const char* key : {"command", "verdict", "statement", "location", "mechanisms", "candidates", "baseline",
-                            "extended", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
+                            "extended", "coverage", "noise_floor_v", "unexplained", "detection_limits", "not_testable",
                             "next_experiment", "wall_s", "warnings"}) {
       EXPECT_TRUE(r.contains(key)) << key;
     }
@@ -268,10 +295,14 @@ TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
   EXPECT_GT(next["expected_gain"], 7);
   EXPECT_THAT(next["why"].get<std::string>(), HasSubstr("To distinguish "));
   EXPECT_THAT(content(path("r.html")), HasSubstr("bms experiment meter_check"));
+  const std::string then = next["then"], measured = "meter_check_measured.csv";
+  EXPECT_EQ(then,
+            "bms diagnose --cell table9 --recording " + now + " --recording " + measured + " --initial-soc 0.98 0.95");
+  EXPECT_THAT(content(path("r.html")), HasSubstr(then));
   ASSERT_EQ(run_tool("experiment meter_check --out " + path("p.csv")).exit_code, 0);
   // readings of the faulty channel: of the source, and of the resting cell
   std::istringstream profile(content(path("p.csv")));
-  std::ofstream later(path("later.csv"));
+  std::ofstream later(path(measured));
   std::string line;
   std::getline(profile, line);
   ASSERT_EQ(line, "time_s,current_a,current_ref_a,voltage_ref_v");
@@ -281,12 +312,14 @@ TEST_F(DiagnoseTool, RequestsTheExperimentThatDecidesAndDecidesByIt) {
     later << line << "," << (source.empty() ? 3.3895 : std::stod(source)) + 0.012 + 0.001 * ((7 * k) % 5 - 2) << "\n";
   }
   later.close();
-  const json both = result("--cell table9 --initial-soc 0.98 --initial-soc 0.95 --recording " + now + " --recording " +
-                           path("later.csv"));
+  std::string both_arguments = then.substr(std::string("bms diagnose ").size());
+  both_arguments.replace(both_arguments.find(measured), measured.size(), path(measured));
+  const json both = result(both_arguments);
   EXPECT_EQ(both["verdict"], "CAUSE");
   EXPECT_EQ(both["mechanisms"][0]["id"], "voltage_offset");
   EXPECT_NEAR(both["mechanisms"][0]["parameters"][0]["value"], 0.012, 0.001);
   EXPECT_TRUE(both["next_experiment"].is_null());
+  EXPECT_TRUE(both["nothing_more"].is_null()) << "one cause is left";
 }
 
 TEST_F(DiagnoseTool, BadUsageAndBadInputAreOneLineAndExitCode2) {

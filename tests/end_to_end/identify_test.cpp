@@ -231,7 +231,17 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   const std::string warm = recording_at(folder_.path().string(), 18.5),
                     cold = recording_at(folder_.path().string(), -10);
   const std::string recordings = "--recording " + warm + " " + cold + " --initial-soc 0.6 --nodes 0.5 ";
-  result(recordings + "--extend --no-healthy --reference-temperature 20");
+  const std::string between = recording_at(folder_.path().string(), 5);
+  const json r = result(recordings + "--extend --no-healthy --reference-temperature 20 --hold-out " + between);
+  ASSERT_EQ(run_tool("simulate --interval --initial-soc 0.6 --cell " + path("cell.toml") + " --recording " + between +
+                     " --json " + path("s.json") + " --out " + path("s.csv"))
+                .exit_code,
+            0);
+  const json& held_out = r["joint"]["held_out"][0];
+  const json simulated = json::parse(content(path("s.json")))["coverage"];
+  EXPECT_GT(held_out["coverage"], 0.5);
+  EXPECT_NEAR(held_out["coverage"], simulated["recording"], 1e-3) << "that of the cell file";
+  EXPECT_NEAR(held_out["half_width_v"], simulated["half_width_v"], 1e-5);
   const std::string cell = content(path("cell.toml"));
   EXPECT_THAT(cell, HasSubstr("\nreference_temperature_c = 20.0\n"));
   EXPECT_THAT(cell, HasSubstr("\nreference_c = 20.0\n"));

@@ -99,6 +99,8 @@ TEST(DiagnosisPage, ShowsCauseLocationSizeComparisonReasonAndResidual) {
   EXPECT_THAT(dom, HasSubstr("of the mismatch explained"));
   EXPECT_THAT(dom, HasSubstr("hold-out: r.csv"));
   EXPECT_THAT(dom, HasSubstr("slow_polarisation"));
+  EXPECT_THAT(dom, HasSubstr("interval of the prediction contains"));
+  EXPECT_EQ(count(dom, "extended with its 95 % interval, V"), 1U) << "of the hold-out alone";
   EXPECT_EQ(count(dom, "NaN"), count(content(folder.path() / "report.html"), "NaN")) << "no coordinate is lost";
 }
 

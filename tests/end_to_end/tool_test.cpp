@@ -54,6 +54,8 @@ TEST_F(Tool, BadUsageIsOneLineAndExitCode2) {
       "replay /",
       "simulate --cell table9 --out x.csv",
       "experiment no_such_experiment --out x.csv",
+      "--processors 0 replay " + shift,
+      "--processors many replay " + shift,
   };
   for (const std::string& arguments : wrong) {
     const ToolRun run = run_tool(arguments);
@@ -224,6 +226,77 @@ TEST_F(Tool, SimulatedNoiseHasTheRequestedSizeAndDependsOnTheSeed) {
   std::smatch found;
   ASSERT_TRUE(std::regex_search(run.out, found, std::regex("\"open_loop_rmse_v\": ([-0-9.e]+)")));
   EXPECT_NEAR(std::stod(found[1]), 0.002, 0.0001);
+}
+
+/// The rows of a table without its header.
+std::vector<std::vector<double>> table_of(const std::string& csv) {
+  std::vector<std::vector<double>> rows;
+  std::istringstream lines(csv);
+  std::string line;
+  for (std::getline(lines, line); std::getline(lines, line);) {
+    rows.emplace_back();
+    std::istringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+TEST_F(Tool, ASimulationWithItsIntervalStatesHowManyReadingsItContains) {
+  std::string text = "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 3'000; ++k) {
+    const double current_a = k / 300 % 2 == 0 ? 0 : -3;
+    // half of the time far from any voltage that table9 could have
+    text +=
+        std::to_string(k) + "," + std::to_string(current_a) + "," + std::to_string(k % 600 < 300 ? 3.286 : 3.0) + "\n";
+  }
+  const std::string simulate = "simulate --cell table9 --initial-soc 0.5 --recording " + write("r.csv", text) +
+                               " --json " + path("r.json") + " --report " + path("r.html") + " --out ";
+  ASSERT_EQ(run_tool(simulate + path("plain.csv")).exit_code, 0);
+  EXPECT_THAT(content(path("r.json")), HasSubstr("\"coverage\": null"));
+  EXPECT_THAT(content(path("r.html")), Not(HasSubstr("95 % interval")));
+  EXPECT_TRUE(content(path("plain.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
+  const ToolRun run = run_tool(simulate + path("s.csv") + " --interval");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  const std::string csv = content(path("s.csv"));
+  EXPECT_TRUE(csv.starts_with("time_s,current_a,voltage_v,soc,voltage_std_v\n"));
+  EXPECT_THAT(content(path("r.html")), HasSubstr("simulated with its 95 % interval, V"));
+  EXPECT_THAT(run.out, HasSubstr("The 95 % interval of the prediction contains "));
+  EXPECT_THAT(run.out, HasSubstr(" % of the readings of r.csv;"));
+  const auto simulated = table_of(csv), plain = table_of(content(path("plain.csv"))), measured = table_of(text);
+  ASSERT_EQ(simulated.size(), measured.size());
+  double within = 0;
+  for (std::size_t k = 0; k < simulated.size(); ++k) {
+    ASSERT_EQ(simulated[k][2], plain[k][2]);
+    within += std::abs(measured[k][2] - simulated[k][2]) <= 1.96 * simulated[k][4] ? 1 : 0;
+  }
+  std::smatch found;
+  const std::string json = content(path("r.json"));
+  ASSERT_TRUE(std::regex_search(json, found, std::regex("\"nominal\": 0.95,\\s*\"recording\": ([0-9.]+)")));
+  EXPECT_NEAR(std::stod(found[1]), within / 3'000, 1e-3);
+  EXPECT_GT(within, 500);
+  EXPECT_LT(within, 2'500);
+}
+
+TEST_F(Tool, AnIntervalNeedsNoMeasuredVoltageAndIsNotThatOfAPack) {
+  std::string drive = "time_s,current_a,temperature_c\n", cells = "time_s,current_a,v_1,v_2\n";
+  for (int k = 0; k < 20; ++k) {
+    drive += std::to_string(k) + ",-3,25\n";
+    cells += std::to_string(k) + ",-3,3.2,3.2\n";
+  }
+  const std::string profile = write("p.csv", drive), pack = write("pack.csv", cells);
+  const ToolRun run =
+      run_tool("simulate --cell table9 --profile " + profile + " --interval --json - --out " + path("s.csv"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("\"coverage\": null"));
+  EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc,temperature_c,voltage_std_v\n"));
+  for (const auto& row : table_of(content(path("s.csv")))) EXPECT_GT(row[5], 0.001);
+  const std::string refused =
+      "simulate --cell table9 --recording " + pack + " --interval --quiet --out " + path("x.csv");
+  const ToolRun of_pack = run_tool(refused);
+  EXPECT_EQ(of_pack.exit_code, 2);
+  EXPECT_THAT(of_pack.err, MatchesRegex("(warning: [^\n]*\n)*--interval:1: not for the recording of a pack, [^\n]*\n"));
+  EXPECT_FALSE(std::filesystem::exists(path("x.csv")));
+  EXPECT_EQ(run_tool(refused + " --map voltage_v=v_1").exit_code, 0);
 }
 
 }  // namespace

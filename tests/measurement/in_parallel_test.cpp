@@ -32,6 +32,26 @@ TEST(InParallel, TheFirstExceptionArrivesAfterAllHaveEnded) {
   EXPECT_EQ(ended, 20);
 }
 
+TEST(InParallel, UsesNoMoreProcessorsThanAllowed) {
+  const int idle = idle_processors();
+  use_processors(1);
+  EXPECT_EQ(best_pieces(), 1U);
+  const std::thread::id caller = std::this_thread::get_id();
+  in_parallel(20, [&](std::size_t) { EXPECT_EQ(std::this_thread::get_id(), caller); });
+  use_processors(3);
+  std::atomic<int> at_work = 0;
+  std::atomic<bool> all = false;
+  in_parallel(3, [&](std::size_t) {
+    ++at_work;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+    while (!all && std::chrono::steady_clock::now() < end) {
+      if (at_work == 3) all = true;
+    }
+  });
+  EXPECT_TRUE(all) << "three threads at the same time";
+  idle_processors() = idle;
+}
+
 /// Pieces call it again; as many threads as processors work, whatever is nested.
 TEST(InParallel, PiecesShareTheProcessors) {
   const int idle = idle_processors();
