@@ -44,8 +44,7 @@ nlohmann::json limits_chart(const workflow::DiagnoseResult& r) {
 }
 
 nlohmann::ordered_json isolability_json(const diagnosis::Diagnosis& d) {
-  if (!d.isolability) return nullptr;
-  const Isolability& i = *d.isolability;
+  const Isolability i = d.isolability.value_or(Isolability{});
   nlohmann::ordered_json ids = nlohmann::ordered_json::array(), sizes = ids, by = ids, gain = ids;
   for (const DetectionLimit& c : i.causes) {
     const model::Parameter& p = catalogue[c.mechanism].parameter[c.parameter];

@@ -12,7 +12,7 @@ namespace bms::reports {
 /// Names, sizes in words and over the largest possible one, the smallest first.
 nlohmann::json limits_chart(const workflow::DiagnoseResult& r);
 
-/// Ids, sizes, a matrix of pairs, and a matrix of what would separate the others; null if it is not known.
+/// Ids, sizes, matrices of pairs: gain, separable, what would separate them; all empty if nothing can be tested.
 nlohmann::ordered_json isolability_json(const diagnosis::Diagnosis& d);
 
 /// Names with sizes, what would separate pairs in words, and for each pair its place among these: -1 these recordings,

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <regex>
@@ -87,6 +88,16 @@ TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
   EXPECT_GT(r["coverage"]["holdout"], 0.95);
   EXPECT_EQ(r["coverage"]["holdout"], r["holdouts"][0]["coverage"]);
   EXPECT_LT(r["holdouts"][0]["half_width_v"], 0.015);
+  const json& i = r["isolability"];
+  const auto place = [&](const char* id) {
+    return static_cast<std::size_t>(std::find(i["ids"].begin(), i["ids"].end(), id) - i["ids"].begin());
+  };
+  const std::size_t leakage = place("leakage"), offset = place("current_offset"), skew = place("channel_skew");
+  ASSERT_LT(std::max({leakage, offset, skew}), i["ids"].size());
+  EXPECT_FALSE(i["separable"][leakage][offset]);
+  EXPECT_EQ(i["separated_by"][leakage][offset], "second_ammeter");
+  EXPECT_TRUE(i["separable"][leakage][skew]);
+  EXPECT_TRUE(i["separated_by"][leakage][skew].is_null());
   // the extended cell file works in other commands
   const std::string cell = content(path("x.toml"));
   EXPECT_THAT(cell, HasSubstr("name = \"table9_extended\""));
@@ -240,6 +251,7 @@ TEST_F(DiagnoseTool, DataWithoutInformationIsNotTestable) {
     const json r = result("--cell table9 --recording " + c.file);
     EXPECT_THAT(r["verdict"].get<std::string>(), AnyOf("NOT_TESTABLE", "DATA_FAULT")) << c.what;
     EXPECT_TRUE(r["mechanisms"].empty()) << c.what;
+    EXPECT_TRUE(r["isolability"]["ids"].empty() && r["isolability"]["separable"].empty()) << c.what;
   }
 }
 
