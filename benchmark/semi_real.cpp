@@ -46,12 +46,8 @@ struct Options {
 
 /// The band of the prediction on the recording that is left out.
 bms::diagnosis::Coverage band_of(const RealSet& set, const Prepared& p) {
-  const bms::diagnosis::PreparedRecording record =
-      bms::workflow::prepared(p.test, set.name, p.cell, bms::workflow::start_of(p.test, p.cell)).record;
-  return bms::diagnosis::prediction_interval(p.cell.parameters, p.cell.mechanisms, record,
-                                             bms::diagnosis::predict(p.cell.parameters, p.cell.mechanisms, record),
-                                             p.cell.healthy)
-      .coverage;
+  const bms::workflow::StartSoc start = bms::workflow::start_of(p.test, p.cell);
+  return bms::workflow::coverage_of(p.cell, bms::workflow::prepared(p.test, set.name, p.cell, start).record);
 }
 
 void print_band(const RealSet& set, const bms::diagnosis::Coverage& band) {

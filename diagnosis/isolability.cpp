@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -57,31 +58,30 @@ class Signatures {
     around.calibration = likelihood.unchanged();
     base_ = likelihood.linearised_at(around.hypothesis, around.calibration)->columns;
     std::vector<MechanismSetting> settings;
+    std::vector<std::pair<std::size_t, std::size_t>> places;  // of each, in ranges_
     for (const Cause& c : causes) {
-      ranges_.emplace_back();
-      for (MechanismSetting s : c.settings) {
-        const bool holds = !later || knowledge_of(c.mechanism).carry_over(s);
+      for (std::size_t n = 0; n < c.settings.size(); ++n) {
+        MechanismSetting s = c.settings[n];
+        if (later && !knowledge_of(c.mechanism).carry_over(s)) continue;
         if (later) knowledge_of(c.mechanism).after_full_charge(s);  // each course begins so
-        ranges_.back().push_back({static_cast<Eigen::Index>(holds ? settings.size() : no_mechanism), holds ? 1 : 0});
-        if (holds) settings.push_back(s);
+        settings.push_back(s);
+        places.emplace_back(ranges_.size(), n);
       }
+      ranges_.emplace_back(c.settings.size());
     }
     std::vector<ProbedColumns> probed(settings.size());
     measurement::in_parallel(settings.size(),
                              [&](std::size_t k) { probed[k] = signature_at(likelihood, around, settings[k]); });
     Eigen::Index all = 0;
-    for (const ProbedColumns& p : probed) all += p.columns.cols();
-    own_.resize(base_.rows(), all);
-    std::vector<ColumnRange> places;
-    for (const ProbedColumns& p : probed) {
-      const Eigen::Index first = places.empty() ? 0 : places.back().first + places.back().count;
-      places.push_back({first, p.columns.cols()});
-      own_.middleCols(first, p.columns.cols()) = p.columns;
+    for (std::size_t k = 0; k < probed.size(); ++k) {
+      ranges_[places[k].first][places[k].second] = {all, probed[k].columns.cols()};
+      all += probed[k].columns.cols();
     }
-    for (auto& of_cause : ranges_) {
-      for (ColumnRange& r : of_cause) {
-        if (r.count > 0) r = places[static_cast<std::size_t>(r.first)];
-      }
+    own_.resize(base_.rows(), all);
+    Eigen::Index first = 0;
+    for (const ProbedColumns& p : probed) {
+      own_.middleCols(first, p.columns.cols()) = p.columns;
+      first += p.columns.cols();
     }
   }
 

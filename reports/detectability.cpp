@@ -9,6 +9,7 @@
 
 #include "diagnosis/texts.hpp"
 #include "experiments/experiment.hpp"
+#include "reports/diagnosis_charts.hpp"
 #include "reports/json_parts.hpp"
 
 namespace bms::reports {
@@ -37,7 +38,7 @@ nlohmann::json limits_chart(const workflow::DiagnoseResult& r) {
     list.push_back({{"id", info.id},
                     {"name", diagnosis::text_of_mechanism(l.mechanism).name},
                     {"text", diagnosis::parameter_text(p, l.value, 0)},
-                    {"ratio", std::round(1e7 * l.value / p.upper(r.cell.parameters.capacity_ah)) / 1e7}});
+                    {"ratio", rounded(l.value / p.upper(r.cell.parameters.capacity_ah), 7)}});
   }
   std::stable_sort(list.begin(), list.end(), [](const auto& a, const auto& b) { return a["ratio"] < b["ratio"]; });
   return list;

@@ -148,6 +148,12 @@ RecordingComparison prepared(measurement::Recording r, const std::string& name, 
   return {std::move(r), std::move(record), {}, {}, {}};
 }
 
+diagnosis::Coverage coverage_of(const files::CellFile& cell, const diagnosis::PreparedRecording& record) {
+  return diagnosis::prediction_interval(cell.parameters, cell.mechanisms, record,
+                                        diagnosis::predict(cell.parameters, cell.mechanisms, record), cell.healthy)
+      .coverage;
+}
+
 DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
   const std::vector<double>& soc = options.initial_soc;
   if (soc.size() > 1 && soc.size() != options.recordings.size()) {

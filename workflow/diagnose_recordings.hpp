@@ -46,6 +46,9 @@ struct DiagnoseInput {
   std::vector<measurement::Warning> warnings;  ///< of the files, and where each recording starts
 };
 
+/// How many readings of a recording lie within the 95 % interval of a cell file's prediction.
+diagnosis::Coverage coverage_of(const files::CellFile& cell, const diagnosis::PreparedRecording& record);
+
 /// Reads the files. A soc_ref of a hold-out has priority over initial_soc. Throws files::BadInput.
 DiagnoseInput read_diagnose_input(const DiagnoseOptions& options);
 

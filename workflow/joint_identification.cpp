@@ -156,11 +156,7 @@ void add_coverage(const std::vector<std::string>& paths, const files::ReadOption
   for (const std::string& path : paths) {
     measurement::Recording recording = read_for_diagnosis(path, reading, cell);
     const StartSoc start = initial_soc ? given_start(cell, *initial_soc) : start_of(recording, cell);
-    const diagnosis::PreparedRecording record = prepared(std::move(recording), path, cell, start).record;
-    joint.coverage.push_back(
-        diagnosis::prediction_interval(cell.parameters, cell.mechanisms, record,
-                                       diagnosis::predict(cell.parameters, cell.mechanisms, record), cell.healthy)
-            .coverage);
+    joint.coverage.push_back(coverage_of(cell, prepared(std::move(recording), path, cell, start).record));
   }
 }
 
