@@ -189,7 +189,7 @@ TEST(DepotAnalysis, ManyRecordingsTogetherShowACapacityThatNoneOfThemNames) {
       if (d > 12) depot.name(depot.at(4, 2, d), "resistance_growth");
     }
     for (const Issue& issue : confirmed(analyse(depot.history(), {}))) {
-      const bool right = issue.truck + " " + issue.cell_index + " " + issue.cause == "truck_4 3 capacity_change";
+      const bool right = issue.truck == "truck_4" && issue.cell_index == "3" && issue.cause == "capacity_change";
       found += right ? 1 : 0;
       others += right ? 0 : 1;
       if (!right) continue;
