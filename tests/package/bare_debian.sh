@@ -1,8 +1,13 @@
 #!/usr/bin/env bash
 # The ways to use greybox-bms elsewhere, each in a Debian that has never seen the project. What is committed is tried.
 #
-#   bare_debian.sh FOLDER package|install|find|subdirectory|cores|python
+#   bare_debian.sh FOLDER demo|test|package|install|find|subdirectory|cores|python
+#   bare_debian.sh FOLDER compiler NAME...
 #
+#   demo          ./bms demo, a newcomer's first command
+#   test          ./bms test, the second; after demo in the same root, as a newcomer does it
+#   compiler      builds the tool and all tests of the host with each compiler (g++-12, clang-19, ...) and counts its
+#                 warnings by option
 #   package       makes the Debian package, installs it in another bare Debian, and uses tool, manual and completions
 #   install       cmake --install into a prefix of its own; sources and build are then hidden
 #   find          a project with find_package(greybox), with the package
@@ -11,20 +16,26 @@
 #   python        pip install --no-build-isolation with Debian's packages; the tests of the module
 #
 # FOLDER is made once by debootstrap, from this machine's package sources; each way works on a copy. package comes
-# first: the others use its package from FOLDER. Prints the seconds of each step, also those of all processors
-# together, which depend less on other load. CMAKE_BUILD_PARALLEL_LEVEL limits the processes of a build. Needs root
-# and debootstrap.
+# before install and what follows it: they use its package from FOLDER. Prints the seconds of each step, also those of
+# all processors together, which depend less on other load. demo and test write their row into the README's status.
+# BMS_DEBIAN is the release, bookworm if not given. CMAKE_BUILD_PARALLEL_LEVEL limits the processes of a build. Needs
+# root and debootstrap.
 set -euo pipefail
-[ $# -eq 2 ] || { sed -n '2,17s/^# \{0,1\}//p' "$0" >&2; exit 2; }
+[ $# -ge 2 ] || { sed -n '2,25s/^# \{0,1\}//p' "$0" >&2; exit 2; }
 project=$(cd "$(dirname "$0")/../.." && pwd)
-folder=$(realpath -m "$1") way=$2
-base=$folder/bare deb=$folder/greybox-bms.deb
+folder=$(realpath -m "$1") way=$2 release=${BMS_DEBIAN:-bookworm}
+shift 2
+base=$folder/bare_$release deb=$folder/greybox-bms.deb
 say() { echo "bare_debian: $*" >&2; }
 [ "$(id -u)" = 0 ] || { say "not root, which a chroot needs"; exit 2; }
 case $way in
-  package) ;;
+  demo | package) ;;
+  test) [ -d "$folder/newcomer" ] || { say "no $folder/newcomer, run demo first"; exit 2; } ;;
+  compiler) [ $# -gt 0 ] || { say "no compiler, expected names of packages: compiler g++-12 clang-19"; exit 2; } ;;
   install | find | subdirectory | cores | python) [ -f "$deb" ] || { say "no $deb, run package first"; exit 2; } ;;
-  *) say "no such way '$way', expected package, install, find, subdirectory, cores or python"; exit 2 ;;
+  *)
+    say "no such way '$way', expected demo, test, compiler, package, install, find, subdirectory, cores or python"
+    exit 2 ;;
 esac
 
 make_base() {
@@ -32,25 +43,27 @@ make_base() {
   [ ! -x "$base/usr/bin/git" ] || return 0
   mkdir -p "$folder"
   url=$(sed -n 's/^URIs: *//p' /etc/apt/sources.list.d/debian.sources | head -1)
-  debootstrap --variant=minbase --include=git,ca-certificates bookworm "$base" "$url" >"$folder/debootstrap.log" 2>&1 ||
-    { tail -5 "$folder/debootstrap.log" >&2; exit 3; }
+  debootstrap --variant=minbase --include=git,ca-certificates "$release" "$base" "$url" \
+    >"$folder/debootstrap.log" 2>&1 || { tail -5 "$folder/debootstrap.log" >&2; exit 3; }
   rm -f "$base/etc/apt/sources.list"
-  cp -a /etc/apt/sources.list.d/debian.sources "$base/etc/apt/sources.list.d/"
+  # shellcheck disable=SC1091
+  sed "s/$(. /etc/os-release && echo "$VERSION_CODENAME")/$release/g" /etc/apt/sources.list.d/debian.sources \
+    >"$base/etc/apt/sources.list.d/debian.sources"
   grep -ls Acquire /etc/apt/apt.conf.d/* | xargs -r -I{} cp -a {} "$base/etc/apt/apt.conf.d/"
   cp -a /usr/share/keyrings/. "$base/usr/share/keyrings/"
   cp -a /etc/ssl/certs "$base/etc/ssl/" 2>/dev/null || true
 }
 
-mounted=()
-release() {
+mounted=() keep_root=
+leave() {
   local root mount
   for root in "${mounted[@]}"; do
     for mount in sys dev proc; do umount -l "$root/$mount" 2>/dev/null || true; done
     # never delete through a mount that would not come off
-    if ! grep -q " $root/" /proc/mounts; then rm -rf --one-file-system "$root"; fi
+    if [ "$root" != "$keep_root" ] && ! grep -q " $root/" /proc/mounts; then rm -rf --one-file-system "$root"; fi
   done
 }
-trap release EXIT
+trap leave EXIT
 
 open_root() {
   local mount
@@ -69,6 +82,12 @@ fresh() {
   open_root "$root"
 }
 
+# kept NAME: the root that an earlier way left
+kept() {
+  root=$folder/$1
+  open_root "$root"
+}
+
 # step NAME: runs the commands of standard input in the root, in /opt/project
 step() {
   local name=$1 TIMEFORMAT="$way: $1: %0R s, processor %0U s, system %0S s"
@@ -82,6 +101,47 @@ step() {
 # packages NAME...: installs them in the root
 packages() {
   step "packages" <<<"apt-get update && apt-get install -y --no-install-recommends $*"
+}
+
+# row COMMAND SECONDS RESULT: its row of the README's table
+row() {
+  "$project/tests/package/fresh_machine_row.py" "$project/README.md" "$1" "$release" \
+    "$(git -C "$project" rev-parse --short=8 HEAD)" "$2" "$3"
+}
+
+way_demo() {
+  fresh newcomer
+  local start=$SECONDS
+  step "./bms demo" <<<'./bms demo'
+  row demo $((SECONDS - start)) "replay, verification on the emulated controller and diagnosis done"
+  keep_root=$root
+}
+
+way_test() {
+  kept newcomer
+  git -C "$root/opt/project" pull -q "$project"
+  local start=$SECONDS
+  step "./bms test" <<<'./bms test'
+  row test $((SECONDS - start)) "$(grep -o '[0-9]*% tests passed.*' "$folder/test.log")"
+}
+
+# what `./bms PURPOSE` needs, without its reasons
+packages_of() {
+  local list
+  for list in "$@"; do sed -n "/^${list}_packages=\"/,/\"\$/s/^\([a-z0-9+.-]*\):.*/\1/p" "$project/bms"; done
+}
+
+way_compiler() {
+  local name
+  fresh compiler
+  # shellcheck disable=SC2046
+  packages $(packages_of host test) libclang-rt-dev "$@"
+  for name in "$@"; do
+    step "$name" <<<"CC=$(sed 's/^g++/gcc/' <<<"$name") CXX=$(sed 's/^clang/clang++/' <<<"$name") \
+      cmake --preset host -DBMS_TESTS=ON -B /opt/$name && cmake --build /opt/$name --target bms host_only_tests -- -k 0"
+    grep -o 'warning: .*\[-W[^]]*\]' "$folder/$way.log" | sed 's/.*\[\(-W[^]]*\)\]/\1/' | sort | uniq -c |
+      sed "s/^/$name:/" || echo "$name: no warning"
+  done
 }
 
 consumer='cp -r tests/package/consumer /opt/consumer && cp model/cells/table9.toml /opt/consumer/my_cell.toml'
@@ -173,12 +233,12 @@ way_cores() {
 way_python() {
   fresh python
   packages /opt/greybox-bms.deb pybind11-dev python3-dev python3-numpy python3-setuptools python3-wheel python3-pip \
-    "$(sed -n '/^host_packages="/,/"$/s/^\([a-z0-9+.-]*\):.*/\1/p' "$project/bms" | tr '\n' ' ')"
+    "$(packages_of host | tr '\n' ' ')"
   step "pip install" <<<'cd python && pip install --no-build-isolation --no-index --break-system-packages .'
   step "tests of the module" <<<'cd / && BMS_TOOL=/usr/bin/bms BMS_SOURCE_DIR=/opt/project \
     python3 /opt/project/tests/python/module_test.py'
 }
 
 make_base
-"way_$way"
+"way_$way" "$@"
 say "$way: done in $SECONDS s"
