@@ -116,9 +116,9 @@ std::string relevant_facts(std::size_t a, std::size_t b, const RecordingFacts& f
 
 std::string no_mismatch_text(const Diagnosis& d, const RecordingFacts& facts) {
   const std::string limits = telling_limits(d, facts);
-  return fmt::format(
-      "The cell file reproduces the recording to {}, which is within its tolerance.{} No action is needed.",
-      millivolts(facts.error_v), limits.empty() ? "" : " The recording would have revealed " + limits + ".");
+  return fmt::format("The cell file reproduces the recording to {}, which is within its tolerance.{} {}",
+                     millivolts(facts.error_v),
+                     limits.empty() ? "" : " The recording would have revealed " + limits + ".", no_action);
 }
 
 std::string cause_text(const Diagnosis& d, const RecordingFacts& facts) {
@@ -225,7 +225,12 @@ std::string because(const Diagnosis& d, const Finding& f, const RecordingFacts& 
     return fmt::format("{}; {} {}.{}", mark, text_of_mechanism(other).name, text_of_mechanism(other).mark,
                        relevant_facts(f.setting.index, other, facts));
   };
-  if (!f.equivalent_to.empty()) return compared(f.equivalent_to.front()) + " That is not enough to distinguish them.";
+  if (!f.equivalent_to.empty()) {
+    const std::size_t rival = f.equivalent_to.front();
+    const bool seen = !relevant_facts(f.setting.index, rival, facts).empty();
+    return compared(rival) +
+           (seen ? " That is not enough to distinguish them." : " This recording does not distinguish the two.");
+  }
   const auto [rival, instead] = rival_of(d, f);
   if (rival == nullptr)
     return fmt::format(

@@ -22,6 +22,9 @@ std::string claim(const MechanismSetting& setting);
 /// What is wrong, how sure, what to do next.
 std::string statement(const Diagnosis& diagnosis, const RecordingFacts& facts);
 
+/// The end of a statement that nothing is wrong.
+inline constexpr std::string_view no_action = "No action is needed.";
+
 /// The end of an ambiguous statement.
 inline constexpr std::string_view another_experiment = "Another experiment is needed.";
 

@@ -36,6 +36,22 @@ TEST(Mechanisms, EachClaimNamesItsStrengthWithItsUncertainty) {
   }
 }
 
+TEST(Mechanisms, AnAmbiguityWithoutAFactThatWouldHelpDoesNotReferToOne) {
+  constexpr std::size_t growth = model::mechanism_index("resistance_growth"),
+                        fast = model::mechanism_index("fast_polarisation"),
+                        hysteresis = model::mechanism_index("ocv_hysteresis");
+  Finding f;
+  f.setting.index = growth;
+  f.equivalent_to = {fast};
+  const std::string without = because({}, f, {});
+  EXPECT_THAT(without, testing::Not(testing::HasSubstr("That is not enough")));
+  EXPECT_THAT(without, testing::HasSubstr(" This recording does not distinguish the two."));
+  f.equivalent_to = {hysteresis};
+  EXPECT_THAT(because({}, f, {}),
+              testing::HasSubstr(" In this recording the charge never turns and there is no rest. That is not "
+                                 "enough to distinguish them."));
+}
+
 TEST(Mechanisms, FarStartsAreNotAboveTheUpperBound) {
   RecordingFacts facts;
   facts.capacity_ah = 6;
