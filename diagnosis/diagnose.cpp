@@ -24,6 +24,7 @@
 #include "diagnosis/testability.hpp"
 #include "diagnosis/trusted_readings.hpp"
 #include "diagnosis/withhold.hpp"
+#include "model/start.hpp"
 
 namespace bms::diagnosis {
 
@@ -301,14 +302,11 @@ std::vector<MechanismSetting> later_recording(const Hypothesis& extended, std::o
   std::vector<MechanismSetting> later;
   for (std::size_t k = 0; k < extended.settings.size(); ++k) {
     MechanismSetting s = extended.settings[k];
-    if (!knowledge_of(s.index).carry_over(s)) continue;
-    if (k < extended.own)
-      s = extended.settings[k];
-    else if (initial_soc && *initial_soc > thresholds.facts.charged_soc)
-      knowledge_of(s.index).after_full_charge(s);
-    else if (initial_soc && *initial_soc < thresholds.facts.discharged_soc)
-      knowledge_of(s.index).after_full_discharge(s);
-    later.push_back(s);
+    if (k < extended.own) {  // starts by the rule wherever it is simulated
+      later.push_back(s);
+    } else if (knowledge_of(s.index).carry_over(s)) {
+      later.push_back(initial_soc ? model::started(s, *initial_soc) : s);
+    }
   }
   return later;
 }

@@ -167,8 +167,6 @@ struct DefaultKnowledge {
   static bool carry_over(MechanismSetting& /*s*/) { return true; }
   /// Changes a setting to what holds after a full charge.
   static void after_full_charge(MechanismSetting& /*s*/) {}
-  /// The same after a full discharge.
-  static void after_full_discharge(MechanismSetting& /*s*/) {}
   /// Share of the cell file's capacity that is left.
   static double capacity_share(const MechanismSetting& /*s*/) { return 1; }
   /// Adds its law, or what takes the law's place, to the simulation of one recording.
@@ -216,7 +214,6 @@ struct MechanismKnowledge {
   bool (*is_implausible)(const MechanismSetting&, const std::vector<MechanismSetting>&, const RecordingFacts&);
   bool (*carry_over)(MechanismSetting&);
   void (*after_full_charge)(MechanismSetting&);
-  void (*after_full_discharge)(MechanismSetting&);
   double (*capacity_share)(const MechanismSetting&);
 };
 

@@ -43,7 +43,6 @@ constexpr MechanismKnowledge knowledge() {
           .is_implausible = K::is_implausible,
           .carry_over = K::carry_over,
           .after_full_charge = K::after_full_charge,
-          .after_full_discharge = K::after_full_discharge,
           .capacity_share = K::capacity_share};
 }
 

@@ -28,6 +28,9 @@ class Coverage {
   double share() const;                                       ///< within the interval; NaN without a reading
   double error_v() const { return error_.root(); }            ///< RMS of measured less predicted
   double half_width_v() const { return half_width_.root(); }  ///< RMS
+  /// Returns true if the prediction failed: fewer readings lie within the interval than nominal_coverage, and the error
+  /// is larger than what the noise alone explains.
+  bool is_beyond(double noise_floor_v) const { return share() < nominal_coverage && error_v() > noise_floor_v; }
 
  private:
   std::size_t within_ = 0;

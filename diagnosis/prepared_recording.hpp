@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +39,9 @@ struct PreparedRecording {
   std::vector<Check> checks = {};          ///< made by reference.hpp
   measurement::Column current_ref_a = {};  ///< of a trusted ammeter that read in nearly all rows; else empty
   measurement::Column voltage_ref_v = {};  ///< the same of a voltmeter
-  bool trusted_current = false, trusted_voltage = false;  ///< current_a and voltage_v are theirs
+  bool trusted_current = false, trusted_voltage = false;   ///< current_a and voltage_v are theirs
+  std::optional<double> other_initial_soc = std::nullopt;  ///< what a reference or the first voltage states, where it
+                                                           ///< contradicts initial_soc
 
   std::size_t size() const { return time_s.size(); }
   double duration_s() const { return time_s.empty() ? 0 : time_s.back() - time_s.front(); }

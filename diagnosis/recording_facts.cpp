@@ -109,6 +109,8 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
   std::vector<double> steps_s, away_k;
   facts.trusted_current = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_current; });
   facts.trusted_voltage = std::all_of(records.begin(), records.end(), [](const auto& r) { return r.trusted_voltage; });
+  if (!records.empty() && records.front().other_initial_soc)
+    facts.start_shift = *records.front().other_initial_soc - records.front().initial_soc;
   for (const PreparedRecording& r : records) {
     facts.duration_s += r.duration_s();
     facts.duration_h += r.duration_s() / 3'600;

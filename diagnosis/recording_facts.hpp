@@ -34,6 +34,8 @@ struct RecordingFacts {
   std::size_t reversals = 0;                              ///< turns of the charge's direction
   std::size_t rates = 0;                                  ///< sizes of current
   bool start_given = false;                               ///< a user gave the initial soc of one at least
+  std::optional<double> start_shift;                      ///< of the first recording's initial soc to another one
+                                                          ///< that is stated and contradicts it
   bool trusted_instruments = false;                       ///< readings of trusted instruments exist
   bool trusted_current = false, trusted_voltage = false;  ///< all readings are those of trusted instruments
   double zero_error_sigmas = 0;  ///< of the current sensor's zero, by its checks where no current flows

@@ -2,6 +2,7 @@
 // LikelihoodModel. Included by its sources alone.
 #pragma once
 
+#include <span>
 #include <type_traits>
 #include <vector>
 
@@ -10,6 +11,7 @@
 #include "diagnosis/mechanisms/all.hpp"
 #include "diagnosis/testability.hpp"
 #include "model/corrected_readings.hpp"
+#include "model/start.hpp"
 
 namespace bms::diagnosis {
 
@@ -37,6 +39,7 @@ SimulationSetup<S> LikelihoodModel::setup_for(const std::vector<model::Mechanism
                            .capacity_ah = cell_.capacity_ah,
                            .bursts = {},
                            .own = false,
+                           .start_soc = r.initial_soc + model::start_shift(std::span(h.settings).first(h.own)),
                            .initial_soc = S(r.initial_soc),
                            .branch_shift = base.branch_shift(record),
                            .capacity_loss = base.capacity_loss(),

@@ -18,6 +18,7 @@ struct SimulationSetup {
   double capacity_ah = 1;
   std::span<const model::Span> bursts;  ///< of a loose contact, in this recording
   bool own = false;                     ///< the setting that is set up is the cell file's own, not a finding
+  double start_soc = 0;                 ///< as given, with the shift of the cell file's own mechanisms
   S initial_soc;
   S branch_shift;          ///< of the branch position at the start of this recording
   S capacity_loss;         ///< share of the cell file's capacity that is gone

@@ -147,15 +147,14 @@ struct Thresholds {
 
   /// What counts as a rest, an edge, a turn of the charge (recording_facts.hpp).
   struct Facts {
-    double rest_c = 0.02;                            ///< [C] below it the cell rests; in wording only
-    double moving_c = 0.02;                          ///< [C] above it a reading counts as load
-    double edge_c = 0.05;                            ///< [C] step of the current
-    double rate_c = 0.05;                            ///< [C] above it currents are sorted by size; in wording only
-    double rate_ratio = 1.33;                        ///< of two sizes of current; in wording only
-    double charged_soc = 0.9, discharged_soc = 0.1;  ///< a later recording that begins beyond was charged, discharged
-    double turn_soc = 0.01;   ///< charge that goes back before its direction has turned; in wording only
-    double rail_c = 0.2;      ///< [C] the largest current at least, to see a sensor's end
-    double rail_share = 0.9;  ///< of the largest current that is near the end
+    double rest_c = 0.02;      ///< [C] below it the cell rests; in wording only
+    double moving_c = 0.02;    ///< [C] above it a reading counts as load
+    double edge_c = 0.05;      ///< [C] step of the current
+    double rate_c = 0.05;      ///< [C] above it currents are sorted by size; in wording only
+    double rate_ratio = 1.33;  ///< of two sizes of current; in wording only
+    double turn_soc = 0.01;    ///< charge that goes back before its direction has turned; in wording only
+    double rail_c = 0.2;       ///< [C] the largest current at least, to see a sensor's end
+    double rail_share = 0.9;   ///< of the largest current that is near the end
     std::size_t rail_rows = 4, rail_runs = 2;  ///< rows near it and separate visits needed
     double stands_within = 0.005;              ///< of the largest current within which a reading stands at its end
     std::size_t stands_before = 3;             ///< rows of a visit there before its voltage counts

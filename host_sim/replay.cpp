@@ -133,11 +133,11 @@ constexpr std::uint32_t voltage_not_used = estimator::voltage_missing | estimato
                                            estimator::not_started;
 constexpr std::uint32_t voltage_not_measured = estimator::voltage_missing | estimator::voltage_implausible;
 
-/// The open loop starts at the reference state of charge, if the recording has one.
 double open_loop_start(const ReplayResult& result) {
   const measurement::Recording& r = result.recording;
+  if (result.open_loop_soc) return *result.open_loop_soc;
   // the mechanism initial_soc is a shift of the user's assumption, not of a reference or an estimate
-  const double shift = value_of(result.cell.mechanisms, model::InitialSoc::id, 0);
+  const double shift = model::start_shift(result.cell.mechanisms);
   const bool reference = !r.soc_ref.empty() && r.soc_ref.front() >= 0 && r.soc_ref.front() <= 1;
   if (reference) return r.soc_ref.front() - shift;
   return result.prior ? result.initial_soc : result.initial_soc - shift;

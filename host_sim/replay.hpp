@@ -130,8 +130,10 @@ struct ReplayResult {
   files::CellFile cell;
   std::string target;
   ScalarKind scalar = ScalarKind::float32;
-  std::optional<SocPrior> prior;  ///< given by the user
-  double initial_soc = 0;         ///< of the prior, or of the estimator after the first sample
+  std::optional<SocPrior> prior;        ///< given by the user
+  double initial_soc = 0;               ///< of the prior, or of the estimator after the first sample
+  std::optional<double> open_loop_soc;  ///< where the open loop starts, less the cell file's shift; nothing: at
+                                        ///< soc_ref, or else at initial_soc
   Track track;
   std::vector<double> open_loop_v;
   SocFigures soc;
@@ -142,8 +144,7 @@ struct ReplayResult {
   std::vector<std::string> doubts;              ///< why the estimates are not reliable (host_sim/judgement.hpp)
 };
 
-/// Fills soc, voltage and open_loop_v from the track and the recording. The open loop starts at soc_ref if there is
-/// one, else at initial_soc.
+/// Fills soc, voltage and open_loop_v from the track and the recording. The open loop starts by model/start.hpp.
 void evaluate(ReplayResult& result);
 
 /// CSV: time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v, further states, flags. write_trace() gives

@@ -11,6 +11,7 @@
 #include "model/corrected_readings.hpp"
 #include "model/extended.hpp"
 #include "model/one_rc.hpp"
+#include "model/start.hpp"
 
 namespace bms::host_sim {
 
@@ -61,9 +62,9 @@ void simulate_one_rc(const SimulationInput& in, Take&& take) {
   }
 }
 
-/// Simulates a cell that rests at initial_soc before the first row, and calls take(SimulatedRow) for each row. With
-/// mechanisms and sensor faults, current and temperature are as measured, and the result is the voltage that would be
-/// measured; the mechanism initial_soc is added to the start.
+/// Simulates a cell that rests at initial_soc before the first row (model/start.hpp), and calls take(SimulatedRow) for
+/// each row. With mechanisms and sensor faults, current and temperature are as measured, and the result is the voltage
+/// that would be measured; the mechanism initial_soc is added to the start.
 ///
 /// A missing current (NaN) is replaced by the last known one. soc is clamped to model::min_soc .. model::max_soc, as in
 /// the estimator. Row 0 has no interval before it: its voltage is that of the rested cell plus R0 I. A row whose time
@@ -74,9 +75,9 @@ void simulate(const SimulationInput& in, Take&& take) {
   const model::CorrectedReadings<double> readings(in.time_s, in.current_a, in.temperature_c,
                                                   value_of(in.mechanisms, model::ChannelSkew::id, 0),
                                                   value_of(in.mechanisms, model::TemperatureSensor::id, 1));
+  const double soc = in.initial_soc + model::start_shift(in.mechanisms);
   model::OpenLoopSimulation<double> simulation(in.cell, in.capacity_ah,
-                                               model::chosen<double>(in.mechanisms, in.capacity_ah),
-                                               in.initial_soc + value_of(in.mechanisms, model::InitialSoc::id, 0));
+                                               model::laws_at_start<double>(in.mechanisms, in.capacity_ah, soc), soc);
   for (std::size_t k = 0; k < in.time_s.size(); ++k) {
     const double duration_s = k == 0 ? 0 : in.time_s[k] - in.time_s[k - 1];
     const double voltage_v = simulation.step(in.time_s[k], duration_s, readings.current(k), readings.temperature(k),

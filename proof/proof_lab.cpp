@@ -86,7 +86,7 @@ const workflow::DiagnoseResult& ProofLab::diagnosed(const files::CellFile& cell,
                                                     const std::vector<measurement::Recording>& list) {
   const std::string key = cell.name + ": " + name;
   return *diagnoses_.get(key, [&] {
-    workflow::DiagnoseInput input{cell, {}, {}, {}};
+    workflow::DiagnoseInput input{cell, {}, {}, {}, {}};
     double rows = 0;
     for (const measurement::Recording& recording : list) {
       input.recordings.push_back(prepared(recording, cell));
@@ -109,11 +109,15 @@ workflow::RecordingComparison ProofLab::scored(const workflow::DiagnoseResult& o
                                                const diagnosis::Hypothesis* instead) {
   workflow::DiagnoseResult one;
   one.cell = of.cell;
-  one.diagnosis = of.diagnosis;
-  if (instead != nullptr) one.diagnosis.extended = *instead;
+  one.extended_cell = of.extended_cell;
   one.holdouts.push_back(prepared(recording(name), of.cell));
-  workflow::compare(one);
-  return one.holdouts.front();
+  workflow::compare_holdouts(one);
+  workflow::RecordingComparison& c = one.holdouts.front();
+  if (instead != nullptr && of.named()) {
+    const auto settings = diagnosis::later_recording(*instead, c.record.initial_soc);
+    c.extended_v = diagnosis::predict(of.diagnosis.cell, settings, c.record);
+  }
+  return c;
 }
 
 std::vector<ProofDiagnosis> ProofLab::diagnoses() const {

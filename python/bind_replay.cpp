@@ -12,6 +12,7 @@
 #include "host_sim/stepper.hpp"
 #include "measurement/recording_checks.hpp"
 #include "python/bindings.hpp"
+#include "workflow/recording_start.hpp"
 
 namespace bms::python {
 
@@ -62,6 +63,7 @@ Result replay(const files::CellFile& cell, const measurement::Recording& recordi
                                         host_sim::starting_point(result->prior, start_shift(cell)), result->scalar,
                                         host_sim::Timing::none);
   result->initial_soc = initial_soc.value_or(result->track.rows.front().soc);
+  result->open_loop_soc = workflow::recording_start(recording, cell, initial_soc).start.soc;
   host_sim::Judgement judgement = host_sim::judge(*result);
   if (judgement.impossible)
     throw files::BadInput(recording.path, 1, *judgement.impossible + "; expected a recording of this cell");

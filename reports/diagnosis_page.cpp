@@ -316,6 +316,9 @@ std::string diagnosis_report(const workflow::DiagnoseResult& r) {
       {"subtitle", fmt::format("{} ({:.1f} h), compared with the cell file of {}", files, hours, r.cell.name)}};
   report["warnings"] = json::array();
   for (const measurement::Warning& w : r.warnings) report["warnings"].push_back(without_folder(w.text, r));
+  report["notes"] = json::array();
+  for (const measurement::Warning& w : r.notes) report["notes"].push_back(without_folder(w.text, r));
+  report["holdouts_beyond"] = r.holdouts_beyond;
   report["faults"] = json::array();
   for (const diagnosis::DataFault& f : d.faults) report["faults"].push_back(f.text);
   report["strips"] = strips(r);

@@ -86,8 +86,16 @@ Json holdouts_of(const std::vector<workflow::RecordingComparison>& holdouts) {
                     {"samples", c.record.size()},
                     {"initial_soc", c.record.initial_soc},
                     {"coverage", number(c.interval.coverage.share())},
-                    {"half_width_v", number(c.interval.coverage.half_width_v())}});
+                    {"half_width_v", number(c.interval.coverage.half_width_v())},
+                    {"rmse_v", number(c.interval.coverage.error_v())}});
   }
+  return list;
+}
+
+/// How each file was read.
+Json formats_of(const std::vector<workflow::RecordingComparison>& recordings) {
+  Json list = Json::array();
+  for (const workflow::RecordingComparison& c : recordings) list.push_back(read_as(c.recording.read_as));
   return list;
 }
 
@@ -228,6 +236,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["cell"] = r.cell.name;
   json["recordings"] = inputs_of(r.recordings);
   json["holdouts"] = holdouts_of(r.holdouts);
+  json["holdouts_beyond"] = r.holdouts_beyond;
   json["verdict"] = name_of(d.verdict);
   json["statement"] = d.statement;
   json["location"] = location_of(d);
@@ -275,9 +284,8 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                       {"fast_excess", number(d.fast_excess)}, {"far_out", number(d.far_out)}};
   json["out"] = r.out;
   json["wall_s"] = r.wall_s;
-  Json recordings = Json::array();
-  for (const workflow::RecordingComparison& of : r.recordings) recordings.push_back(read_as(of.recording.read_as));
-  json["read_as"] = recordings;
+  json["read_as"] = formats_of(r.recordings);
+  json["notes"] = warnings_of(r.notes);
   json["warnings"] = warnings_of(r.warnings);
   return text_of(json);
 }

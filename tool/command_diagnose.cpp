@@ -15,6 +15,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "workflow/diagnose_recordings.hpp"
+#include "workflow/holdout_judgement.hpp"
 #include "workflow/next_steps.hpp"
 #include "workflow/pack_diagnosis.hpp"
 
@@ -52,8 +53,16 @@ std::string finding_text(const diagnosis::Diagnosis& d, const diagnosis::Finding
 std::string comparison_text(const workflow::DiagnoseResult& r) {
   std::string text;
   if (r.baseline && r.extended && r.named()) {
-    text += fmt::format("Open-loop error: {:.2f} mV RMS before, {:.2f} mV with the findings.\n",
-                        1e3 * r.baseline->rmse_v, 1e3 * r.extended->rmse_v);
+    const std::string after = diagnosis::millivolts(r.extended->rmse_v),
+                      adjusted = diagnosis::millivolts(r.diagnosis.unexplained_rmse_v);
+    text += fmt::format("Open-loop error: {:.2f} mV RMS before, {:.2f} mV with the findings", 1e3 * r.baseline->rmse_v,
+                        1e3 * r.extended->rmse_v);
+    if (after != adjusted)
+      text += fmt::format(
+          "; {} remain where also the start and the current sensor's zero of these recordings are adjusted within "
+          "their tolerance",
+          adjusted);
+    text += ".\n";
   }
   if (r.baseline_holdout && r.extended_holdout) {
     text += fmt::format(
@@ -133,9 +142,11 @@ class DiagnoseCommand final : public Command {
     c.add_option("--holdout", o_.holdouts,
                  "later recordings of the same cell and instruments; they are only compared with the result")
         ->type_name("FILE");
-    c.add_option("--initial-soc", o_.initial_soc,
-                 "state of charge at the start, one for all recordings or one for each; if not given the first value "
-                 "of soc_ref, or else an estimate from the first voltage")
+    c.add_option(
+         "--initial-soc", o_.initial_soc,
+         "state of charge at the start: one for all recordings, or one for each recording and then for each "
+         "hold-out; a start that is not given is the first value of soc_ref, or else an estimate from the first "
+         "voltage")
         ->check(Within(0.0, 1.0));
     c.add_option("--out", out_, "cell file to write, with the findings")->type_name("EXTENDED.toml");
     c.add_option("--false-alarm-rate", false_alarm_rate_,
@@ -183,17 +194,21 @@ class DiagnoseCommand final : public Command {
     options.false_alarm_rate = false_alarm_rate_;
     options.stopped = [] { return interrupts != 0; };
     static_cast<void>(std::signal(SIGINT, on_interrupt));
-    workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(o_), options);
+    workflow::DiagnoseInput input = workflow::read_diagnose_input(o_);
+    for (const workflow::RecordingComparison& of : input.recordings) print_read_as(output_, of.recording);
+    for (const measurement::Warning& w : input.notes) print_note(output_, w.text);
+    for (const measurement::Warning& w : input.warnings) warn(w.text);  // before the search: it may be in vain
+    const std::size_t said = input.warnings.size();
+    workflow::DiagnoseResult result = workflow::diagnose_recordings(std::move(input), options);
     if (result.diagnosis.interrupted) {
       result.warnings.push_back(
           {"interrupted", "stopped by Ctrl-C: later steps of the search might have changed this result"});
     } else {
       workflow::add_next_experiment(o_, result);
     }
-    workflow::add_holdout_warnings(result);
+    workflow::judge_holdouts(o_, result);
     result.out = out_;
-    for (const workflow::RecordingComparison& of : result.recordings) print_read_as(output_, of.recording);
-    for (const measurement::Warning& w : result.warnings) warn(w.text);
+    for (std::size_t k = said; k < result.warnings.size(); ++k) warn(result.warnings[k].text);
     if (!out_.empty()) write_output(out_, files::cell_text(result.extended_cell));
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
     if (!output_.report.empty()) write_output(output_.report, reports::diagnosis_report(result));

@@ -20,6 +20,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/pack_cells.hpp"
+#include "workflow/recording_start.hpp"
 
 namespace bms::tool {
 
@@ -200,6 +201,8 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
     if (!result.difference && run.compared > 0) result.verified_against = "log";
   }
   judge(options, result);
+  if (!run.log)
+    result.open_loop_soc = workflow::recording_start(result.recording, result.cell, options.initial_soc).start.soc;
   host_sim::evaluate(result);
   if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
 }

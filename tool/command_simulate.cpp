@@ -196,10 +196,11 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
   const measurement::Recording& r = run.recording;
   host_sim::GaussianNoise noise(options.seed);
   const bool temperature = !r.temperature_c.empty();  // a replay needs it, because mechanisms depend on it
-  std::string csv = temperature ? "time_s,current_a,voltage_v,soc,temperature_c" : "time_s,current_a,voltage_v,soc";
+  std::string csv = "time_s,current_a,voltage_v,soc";
+  if (temperature) csv += ",temperature_c";
   for (const SimulatedCell& cell : run.cells) fmt::format_to(std::back_inserter(csv), ",v_{}", cell.number);
   if (run.interval) csv += ",voltage_std_v";
-  csv += '\n';
+  csv += ",soc_ref\n";
   csv.reserve(run.rows.size() * 48);
   for (std::size_t k = 0; k < run.rows.size(); ++k) {
     const double current_a = r.current_a[k] + options.noise_a * noise.next();
@@ -211,7 +212,7 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
     for (const SimulatedCell& cell : run.cells)
       fmt::format_to(std::back_inserter(csv), ",{:.10g}", cell.voltage_v[k] + options.noise_v * noise.next());
     if (run.interval) fmt::format_to(std::back_inserter(csv), ",{:.4g}", run.interval->sigma_v[k]);
-    csv += '\n';
+    fmt::format_to(std::back_inserter(csv), ",{:.10g}\n", run.rows[k].soc);
   }
   return csv;
 }
@@ -275,9 +276,11 @@ class SimulateCommand final : public Command {
     c.add_option("--profile", o_.profile, "current profile: a recording without voltage_v")
         ->type_name("FILE")
         ->excludes(recording);
-    o_.initial_soc_given = c.add_option("--initial-soc", o_.initial_soc,
-                                        "state of charge at the start, 0..1; if not given soc_ref, or else 0.5")
-                               ->check(Within(0.0, 1.0));
+    o_.initial_soc_given =
+        c.add_option("--initial-soc", o_.initial_soc,
+                     "state of charge at the start, 0..1; if not given the first value of soc_ref, or else an "
+                     "estimate from the first voltage, or else 0.5")
+            ->check(Within(0.0, 1.0));
     c.add_option("--with", o_.with,
                  "mechanism to add, or to use instead of the cell's own, for example "
                  "ocv_hysteresis:half_gap_v=0.01,decay=40; may be repeated")
@@ -292,7 +295,10 @@ class SimulateCommand final : public Command {
     c.add_flag("--interval", o_.interval,
                "add the column voltage_std_v, the standard deviation of a healthy cell's reading around the simulated "
                "voltage: 1.96 times it contains 95 % of the readings; not for the recording of a pack");
-    c.add_option("--out", o_.out, "CSV file to write: time_s, current_a, voltage_v, soc; of a pack also v_1 to v_N")
+    c.add_option(
+         "--out", o_.out,
+         "CSV file to write: time_s, current_a, voltage_v, soc, and soc_ref with the same values, which the other "
+         "commands read; of a pack also v_1 to v_N")
         ->required()
         ->type_name("FILE");
     add_reading(c, o_.reading);
@@ -305,9 +311,11 @@ class SimulateCommand final : public Command {
     o_.output.set_own(o_.out);
     o_.output.protect({o_.cell, o_.input()});
     SimulationRun run = read(o_);
-    const measurement::Column& known = run.recording.soc_ref;
-    if (o_.initial_soc_given->count() == 0 && !known.empty() && known.front() >= 0 && known.front() <= 1)
-      o_.initial_soc = known.front();
+    if (o_.initial_soc_given->count() == 0) {
+      const workflow::RecordingStart found = workflow::recording_start(run.recording, run.cell);
+      o_.initial_soc = found.start.soc;
+      if (!found.origin.empty()) print_note(o_.output, o_.input() + ": " + found.origin);
+    }
     compute(o_, run);
     if (o_.interval) add_interval(o_, run);
     write(o_, run);

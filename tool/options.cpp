@@ -84,6 +84,10 @@ void print_read_as(const Output& output, const measurement::Recording& recording
   fmt::print(stderr, "{}\n", files::printable(recording.path + ": " + recording.read_as));
 }
 
+void print_note(const Output& output, const std::string& text) {
+  if (!output.quiet) fmt::print(stderr, "{}\n", files::printable(text));
+}
+
 void refuse_contradiction(const measurement::Recording& recording) {
   const std::string what = measurement::contradiction(recording);
   if (!what.empty()) throw files::BadInput(recording.path, 1, what);

@@ -31,6 +31,8 @@ void add_reading(CLI::App& command, files::ReadOptions& options);
 void complete_reading(files::ReadOptions& options);
 /// Prints what was detected in a recording, if it is not in the project's own format.
 void print_read_as(const Output& output, const measurement::Recording& recording);
+/// Prints on stderr what a user may want to know and need not act on, unless the output is quiet.
+void print_note(const Output& output, const std::string& text);
 /// Throws BadInput if the readings contradict the cell that they were compared with.
 void refuse_contradiction(const measurement::Recording& recording);
 

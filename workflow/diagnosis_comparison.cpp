@@ -8,6 +8,7 @@
 #include "diagnosis/model_tolerance.hpp"
 #include "host_sim/replay.hpp"
 #include "identification/goodness_of_fit.hpp"
+#include "model/start.hpp"
 
 namespace bms::workflow {
 
@@ -38,46 +39,42 @@ std::string ids_of(const std::vector<std::size_t>& mechanisms) {
   return ids;
 }
 
-/// Mechanisms of the extended model in a recording. later: a hold-out.
-std::vector<model::MechanismSetting> extended_settings(const DiagnoseResult& r, const RecordingComparison& c,
-                                                       bool later) {
-  if (later && r.named()) return diagnosis::later_recording(r.diagnosis.extended, c.record.initial_soc);
+/// Mechanisms of the extended model in the recordings that were diagnosed.
+std::vector<model::MechanismSetting> extended_settings(const DiagnoseResult& r) {
   if (r.has_term()) return diagnosis::with_term(r.cell.mechanisms, *r.diagnosis.law);
   return r.named() ? r.diagnosis.extended.settings : r.cell.mechanisms;
 }
 
 }  // namespace
 
-void compare(DiagnoseResult& r) {
+void compare_recordings(DiagnoseResult& r) {
   const std::vector<model::MechanismSetting>& own = r.cell.mechanisms;
-  const auto simulate = [&](const model::CellParameters<>& cell, const diagnosis::Hypothesis& h,
-                            std::vector<RecordingComparison>& list, std::vector<double> RecordingComparison::*into,
-                            bool extended) {
-    const bool later = &list == &r.holdouts;
-    for (RecordingComparison& c : list) {
-      diagnosis::Hypothesis here = h;
-      here.bursts.clear();
-      if (!later && h.bursts.size() == list.size())
-        here.bursts = {h.bursts[static_cast<std::size_t>(&c - list.data())]};
-      const diagnosis::LikelihoodModel likelihood(cell, own, {c.record}, {});
-      if (extended) here.settings = extended_settings(r, c, later);
-      c.*into = likelihood.voltage(here, likelihood.unchanged(), 0);
-    }
-  };
-  const diagnosis::Hypothesis base{own, own.size(), {}}, extended = r.named() ? r.diagnosis.extended : base;
-  for (auto* list : {&r.recordings, &r.holdouts}) {
-    simulate(r.cell.parameters, base, *list, &RecordingComparison::base_v, false);
-    simulate(r.diagnosis.cell, extended, *list, &RecordingComparison::extended_v, true);
+  diagnosis::Hypothesis found{extended_settings(r), own.size(), {}};
+  for (std::size_t n = 0; n < r.recordings.size(); ++n) {
+    RecordingComparison& c = r.recordings[n];
+    c.base_v = diagnosis::predict(r.cell.parameters, own, c.record);
+    const std::vector<std::vector<model::Span>>& bursts = r.diagnosis.extended.bursts;
+    found.bursts.clear();
+    if (r.named() && bursts.size() == r.recordings.size()) found.bursts = {bursts[n]};
+    const diagnosis::LikelihoodModel likelihood(r.diagnosis.cell, own, {c.record}, {});
+    c.extended_v = likelihood.voltage(found, likelihood.unchanged(), 0);
+  }
+}
+
+void compare_holdouts(DiagnoseResult& r) {
+  for (RecordingComparison& c : r.holdouts) {
+    c.base_v = diagnosis::predict(r.cell.parameters, r.cell.mechanisms, c.record);
+    c.extended_v = diagnosis::predict(r.extended_cell.parameters, r.extended_cell.mechanisms, c.record);
   }
 }
 
 void add_intervals(DiagnoseResult& r) {
-  for (auto* list : {&r.recordings, &r.holdouts}) {
-    for (RecordingComparison& c : *list)
-      c.interval =
-          diagnosis::prediction_interval(r.extended_cell.parameters, extended_settings(r, c, list == &r.holdouts),
-                                         c.record, c.extended_v, r.cell.healthy);
-  }
+  const auto add = [&](RecordingComparison& c, const std::vector<model::MechanismSetting>& settings) {
+    c.interval =
+        diagnosis::prediction_interval(r.extended_cell.parameters, settings, c.record, c.extended_v, r.cell.healthy);
+  };
+  for (RecordingComparison& c : r.recordings) add(c, extended_settings(r));
+  for (RecordingComparison& c : r.holdouts) add(c, r.extended_cell.mechanisms);
 }
 
 std::optional<diagnosis::Coverage> coverage(const std::vector<RecordingComparison>& list) {
@@ -101,21 +98,26 @@ std::optional<OpenLoopFigures> figures(const std::vector<RecordingComparison>& l
 }
 
 std::optional<SocErrors> soc_errors(const DiagnoseResult& r) {
-  identification::ErrorFigure base, extended;
-  const auto add = [](const files::CellFile& cell, const RecordingComparison& c, identification::ErrorFigure& figure) {
+  identification::ErrorFigure base, extended, sigma;
+  const auto add = [](const files::CellFile& cell, const RecordingComparison& c, identification::ErrorFigure& figure,
+                      identification::ErrorFigure* stated) {
     const auto start =
-        host_sim::starting_point(host_sim::SocPrior{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)});
+        host_sim::starting_point(host_sim::SocPrior{c.record.initial_soc, std::max(c.record.initial_soc_sigma, 0.02)},
+                                 model::start_shift(cell.mechanisms));
     const host_sim::Track track =
         host_sim::run_on_host(cell, measurement::samples(c.recording), start, host_sim::ScalarKind::float32);
-    for (std::size_t k = 0; k < track.rows.size(); ++k) figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
+    for (std::size_t k = 0; k < track.rows.size(); ++k) {
+      figure.add(track.rows[k].soc - c.recording.soc_ref[k]);
+      if (stated != nullptr) stated->add(track.rows[k].soc_sigma);
+    }
   };
   for (const RecordingComparison& c : r.holdouts) {
     if (c.recording.soc_ref.empty()) continue;
-    add(r.cell, c, base);
-    add(r.extended_cell, c, extended);
+    add(r.cell, c, base, nullptr);
+    add(r.extended_cell, c, extended, &sigma);
   }
   if (base.count() == 0) return std::nullopt;
-  return SocErrors{base.rms(), extended.rms()};
+  return SocErrors{base.rms(), extended.rms(), sigma.rms()};
 }
 
 namespace {

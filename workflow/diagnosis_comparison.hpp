@@ -5,9 +5,12 @@
 
 namespace bms::workflow {
 
-/// Simulates both models in open loop from the start of each recording. Fills base_v and extended_v of recordings and
-/// hold-outs.
-void compare(DiagnoseResult& r);
+/// Simulates both models in open loop from the start of each recording that was diagnosed. Fills base_v and extended_v.
+void compare_recordings(DiagnoseResult& r);
+
+/// The same of the hold-outs, with the extended cell as it is written: bms simulate of that file gives the same
+/// voltages. Needs the extended cell.
+void compare_holdouts(DiagnoseResult& r);
 
 /// Adds the intervals around extended_v. Needs the extended cell.
 void add_intervals(DiagnoseResult& r);

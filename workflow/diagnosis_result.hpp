@@ -21,6 +21,7 @@ struct OpenLoopFigures {
 /// RMS error of the estimated state of charge against soc_ref, as a fraction.
 struct SocErrors {
   double baseline_rmse = 0, extended_rmse = 0;
+  double extended_sigma = 0;  ///< RMS of the standard deviation that the estimator states
 };
 
 /// One recording and the voltages of both models. Nothing is fitted to it except the mechanisms found.
@@ -39,10 +40,13 @@ struct DiagnoseResult {
   std::optional<SocErrors> soc;                   ///< of the hold-outs with a reference
   std::optional<diagnosis::NextExperiment> next;  ///< separates the causes that are still possible
   std::string then;                               ///< command that diagnoses its recording together with these
+  std::vector<std::string> holdouts_beyond;       ///< names of those that contradict the result
+  std::string together;                           ///< command that diagnoses them together with the recordings
   std::string nothing_more;                       ///< why there is no next one, where causes are still ambiguous
   std::string out;
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;
+  std::vector<measurement::Warning> notes;  ///< what a user may want to know and need not act on
 
   /// Returns true if the verdict names mechanisms; they are then in the extended cell.
   bool named() const { return diagnosis::names(diagnosis.verdict); }

@@ -303,7 +303,7 @@ void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs
   }
   JointResult joint = options.circuit ? identified_again(*options.circuit, recordings)
                                       : identify_jointly(cell, covers_both_directions(recordings), recordings);
-  hold_out(options.hold_out, options.reading, inputs.options, joint);
+  hold_out(options.hold_out, options.reading, inputs.options, cell, joint);
   for (const measurement::Warning& w : warnings_of(joint)) result.warnings.push_back(w);
   put(joint, cell);
   result.joint = std::move(joint);
@@ -391,7 +391,7 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
     cell.sources["healthy"] = healthy_summary(cell.healthy) + "; each diagnosed with a cell identified without it";
   }
   if (result.cell_file && result.joint)
-    add_coverage(options.hold_out, options.reading, options.initial_soc.value, *result.cell_file, *result.joint);
+    add_coverage(options.hold_out, options.reading, *result.cell_file, *result.joint);
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

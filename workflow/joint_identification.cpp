@@ -141,22 +141,24 @@ JointResult identified_again(const JointResult& joint, const std::vector<id::Joi
   return again;
 }
 
-void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
-              JointResult& joint) {
+void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, DataOptions options,
+              const files::CellFile& cell, JointResult& joint) {
   for (const std::string& path : paths) {
     const measurement::Recording recording = files::read_recording(path, files::VoltageColumn::required, reading);
+    options.initial = {start_of(recording, cell).soc, false};  // a start that the user gives is that of the recordings
     const IdentificationData of = identification_data(recording, options);
     const auto r = joint_recording(recording, of, of.record.initial_soc, joint.choice.model.cell.capacity_ah);
     joint.held_out.push_back(id::left_out_error(joint.choice.model, r, {}));
   }
 }
 
-void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading,
-                  const std::optional<double>& initial_soc, const files::CellFile& cell, JointResult& joint) {
-  for (const std::string& path : paths) {
-    measurement::Recording recording = read_for_diagnosis(path, reading, cell);
-    const StartSoc start = initial_soc ? given_start(cell, *initial_soc) : start_of(recording, cell);
-    joint.coverage.push_back(coverage_of(cell, prepared(std::move(recording), path, cell, start).record));
+void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading, const files::CellFile& cell,
+                  JointResult& joint) {
+  for (std::size_t k = 0; k < paths.size(); ++k) {
+    measurement::Recording recording = read_for_diagnosis(paths[k], reading, cell);
+    const StartSoc start = start_of(recording, cell);
+    joint.coverage.push_back(coverage_of(cell, prepared(std::move(recording), paths[k], cell, start).record));
+    joint.held_out[k].rmse_v = joint.coverage.back().error_v();
   }
 }
 

@@ -40,14 +40,15 @@ JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
 /// The circuit of `joint` fitted to other recordings of the same cell. Throws BadInput.
 JointResult identified_again(const JointResult& joint, const std::vector<identification::JointRecording>& recordings);
 
-/// Predicts recordings that did not enter the fit.
-void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, const DataOptions& options,
-              JointResult& joint);
+/// Predicts recordings that did not enter the fit. Each starts by recording_start(), without a user. cell: of the
+/// start.
+void hold_out(const std::vector<std::string>& paths, const files::ReadOptions& reading, DataOptions options,
+              const files::CellFile& cell, JointResult& joint);
 
-/// Adds how many readings of the recordings that were held out are within the cell file's 95 % interval. Each starts at
-/// initial_soc or, if not given, where a diagnosis would start.
-void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading,
-                  const std::optional<double>& initial_soc, const files::CellFile& cell, JointResult& joint);
+/// Adds how many readings of the recordings that were held out are within the cell file's 95 % interval, and their
+/// error: that of bms simulate, replay and diagnose with this cell file.
+void add_coverage(const std::vector<std::string>& paths, const files::ReadOptions& reading, const files::CellFile& cell,
+                  JointResult& joint);
 
 /// Unknowns at a bound, and a search that did not converge.
 std::vector<measurement::Warning> warnings_of(const JointResult& joint);

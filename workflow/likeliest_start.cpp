@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "files/cell_file.hpp"
 #include "host_sim/simulation.hpp"
 #include "workflow/thinned_recording.hpp"
 

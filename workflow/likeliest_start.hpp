@@ -1,7 +1,8 @@
 // The state of charge at the start of a recording whose first voltage leaves it open.
 #pragma once
 
-#include "workflow/diagnose_recordings.hpp"
+#include "measurement/recording.hpp"
+#include "workflow/recording_start.hpp"
 
 namespace bms::workflow {
 

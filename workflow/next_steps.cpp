@@ -57,11 +57,31 @@ std::string joint_command(const DiagnoseOptions& options, const std::vector<Reco
   return text + reading_options(options.reading);
 }
 
+std::string together_command(const DiagnoseOptions& options, const std::vector<RecordingComparison>& recordings,
+                             const std::vector<RecordingComparison>& holdouts) {
+  std::string text = "bms diagnose --cell " + word(options.cell), starts;
+  bool given = true;
+  for (const auto* list : {&recordings, &holdouts}) {
+    for (const RecordingComparison& c : *list) {
+      text += " --recording " + word(c.recording.path);
+      starts += fmt::format(" {:.6g}", c.record.initial_soc);
+      given = given && c.record.initial_soc_given;
+    }
+  }
+  if (given) text += " --initial-soc" + starts;
+  return text + reading_options(options.reading);
+}
+
 std::vector<std::string> next_steps(const DiagnoseResult& r) {
-  if (!r.next && r.nothing_more.empty()) return {};
-  if (!r.next) return {r.nothing_more};
-  return {diagnosis::why(*r.next), std::string(diagnosis::instruction(*r.next)), diagnosis::command(*r.next),
-          "Then diagnose all recordings together:", r.then};
+  std::vector<std::string> steps;
+  if (!r.together.empty()) steps = {"Diagnose the recordings and the hold-outs together:", r.together};
+  if (!r.next && !r.nothing_more.empty()) steps.push_back(r.nothing_more);
+  if (!r.next) return steps;
+  for (const std::string& step :
+       {diagnosis::why(*r.next), std::string(diagnosis::instruction(*r.next)), diagnosis::command(*r.next),
+        std::string("Then diagnose all recordings together:"), r.then})
+    steps.push_back(step);
+  return steps;
 }
 
 }  // namespace bms::workflow

@@ -15,7 +15,13 @@ namespace bms::workflow {
 std::string joint_command(const DiagnoseOptions& options, const std::vector<RecordingComparison>& recordings,
                           const diagnosis::NextExperiment& next);
 
-/// Lines of a text, in the order in which they are to be done; empty if no cause is left open.
+/// The same of the recordings and their hold-outs: "bms diagnose --cell C --recording A --recording B". All start as
+/// they did here, if each start was given.
+std::string together_command(const DiagnoseOptions& options, const std::vector<RecordingComparison>& recordings,
+                             const std::vector<RecordingComparison>& holdouts);
+
+/// Lines of a text, in the order in which they are to be done; empty if no cause is left open and no hold-out
+/// contradicts the result.
 std::vector<std::string> next_steps(const DiagnoseResult& result);
 
 }  // namespace bms::workflow

@@ -28,9 +28,14 @@ struct Knowledge<model::InitialSoc> : DefaultKnowledge<model::InitialSoc> {
     if (!c.facts.start_given) return "no initial state of charge was given";
     return std::nullopt;
   }
-  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts&) {
-    return {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
+  /// Far starts, and the one that the recording states elsewhere.
+  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& facts) {
+    std::vector<std::vector<double>> starts = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
+    if (facts.start_shift) starts.push_back({*facts.start_shift});
+    return starts;
   }
+  /// The true start is any state of charge, whatever was given.
+  static Bounds bounds(std::size_t /*parameter*/, Bounds /*file*/, double /*rc_s*/) { return {-1, 1}; }
   static bool carry_over(MechanismSetting&) { return false; }
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& value) {

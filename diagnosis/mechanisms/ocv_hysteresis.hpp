@@ -6,6 +6,7 @@
 #include "diagnosis/dual.hpp"
 #include "diagnosis/mechanism.hpp"
 #include "model/mechanisms/ocv_hysteresis.hpp"
+#include "model/start.hpp"
 
 namespace bms::diagnosis {
 
@@ -90,18 +91,15 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
     return true;
   }
   static void after_full_charge(MechanismSetting& s) { s.value[initial] = 1; }
-  static void after_full_discharge(MechanismSetting& s) { s.value[initial] = -1; }
-  /// A finding's `initial` is the first recording's; each other recording has a start of its own. A full cell was
-  /// charged last, an empty one discharged.
+  /// A finding's `initial` is the first recording's; each other recording has a start of its own (model/start.hpp),
+  /// which the calibration moves where the state of charge does not decide it.
   template <class S>
   static void set_up(SimulationSetup<S>& setup, const model::MechanismValues<S>& with) {
     model::MechanismValues<S> value = with;
-    if ((setup.own || setup.record > 0) && setup.recording.initial_soc > thresholds.facts.charged_soc) {
-      value[initial] = S(1);
-    } else if ((setup.own || setup.record > 0) && setup.recording.initial_soc < thresholds.facts.discharged_soc) {
-      value[initial] = S(-1);
-    } else if (setup.own || setup.record > 0) {
-      S start = setup.branch_shift + (setup.own ? number(value[initial]) : 0);
+    if (setup.own || setup.record > 0) {
+      const model::StartPosition at = model::start_position(setup.own ? number(value[initial]) : 0, setup.start_soc);
+      S start(at.position);
+      if (!at.known) start += setup.branch_shift;
       if (number(start) > 1) start = S(1);
       if (number(start) < -1) start = S(-1);
       value[initial] = start;

@@ -132,6 +132,11 @@ class TableReader {
     name_unused();
   }
 
+  /// What bms simulate writes in addition to soc_ref, and no command needs.
+  bool is_known_copy(const std::string& heading) const {
+    return layout_.own && layout_.count(Quantity::soc_ref) > 0 && (heading == "soc" || heading == "voltage_std_v");
+  }
+
   void name_unused() {
     if (options_.keep_all) {
       recording_.others.resize(layout_.unused.size());
@@ -142,11 +147,14 @@ class TableReader {
       }
       return;
     }
+    std::vector<std::string> unused;
+    for (const std::size_t k : layout_.unused) {
+      if (!is_known_copy(layout_.headings[k])) unused.push_back(layout_.headings[k]);
+    }
     std::string ignored;
-    for (std::size_t k = 0; k < std::min(most_ignored_named, layout_.unused.size()); ++k)
-      ignored += (ignored.empty() ? "" : ", ") + in_quotes(layout_.headings[layout_.unused[k]]);
-    if (layout_.unused.size() > most_ignored_named)
-      ignored += fmt::format(" and {} more", layout_.unused.size() - most_ignored_named);
+    for (std::size_t k = 0; k < std::min(most_ignored_named, unused.size()); ++k)
+      ignored += (ignored.empty() ? "" : ", ") + in_quotes(unused[k]);
+    if (unused.size() > most_ignored_named) ignored += fmt::format(" and {} more", unused.size() - most_ignored_named);
     if (!ignored.empty()) recording_.warnings.push_back({"ignored_column", "columns not used: " + ignored});
   }
 

@@ -100,8 +100,9 @@ def diagnose(cell, recordings, *, holdouts=(), initial_soc=None, progress=None):
     """Finds where a calibrated cell and its recordings disagree, and why, as `bms diagnose`. Takes seconds to minutes.
 
     cell: as for replay(). recordings, holdouts: as for identify(), the earliest first. initial_soc: 0 to 1, one for all
-    or a list with one for each; None: soc_ref or an estimate. progress: called with the share done (0 to 1) and the
-    part. Returns a Diagnosis. Ctrl-C ends it with KeyboardInterrupt."""
+    recordings, or a list with one for each recording and then for each hold-out; None: soc_ref or an estimate.
+    progress: called with the share done (0 to 1) and the part. Returns a Diagnosis. Ctrl-C ends it with
+    KeyboardInterrupt."""
     if initial_soc is None:
         given = []
     else:

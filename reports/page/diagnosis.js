@@ -22,8 +22,12 @@
   const draw_head = () => {
     get('verdict').textContent = report.verdict.replace('_', ' ');
     get('verdict').style.background = verdicts[report.verdict];
+    if (report.holdouts_beyond.length) {  // the verdict holds for the recordings alone
+      get('verdict').textContent += ', HOLD-OUT DISAGREES';
+      get('verdict').style.background = amber;
+    }
     get('statement').textContent = signs(report.statement);
-    get('subtitle').textContent = report.subtitle;
+    get('subtitle').textContent = [report.subtitle, ...report.notes].join('; ');
     drawing.warnings(get('warnings'), report.warnings);
     const caption = id => get(id).previousElementSibling.firstChild;
     if (!report.named) caption('before-after').textContent = 'Compared with the noise floor ';
@@ -239,7 +243,8 @@
     const open = percent(1 - explained) + ' unexplained';
     if (explained < 0.75) draw(s, 'text', {x: width - 6, y: 13, class: 'end'}, open);
     const residual = mv(report.unexplained.rmse_mv) + ' RMS unexplained; a healthy cell causes up to ';
-    draw(s, 'text', {x: 0, y: 35}, residual + mv(report.floor_mv) + '.');
+    const adjusted = 'Start and zero of the current sensor adjusted to these recordings, within their tolerance';
+    hint(draw(s, 'text', {x: 0, y: 35}, residual + mv(report.floor_mv) + '.'), adjusted);
   };
   const draw_unexplained = () => {
     const box = get('unexplained'), next = report.next, judged = report.limits.length;

@@ -20,6 +20,7 @@ using nlohmann::json;
 using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::MatchesRegex;
+using ::testing::Not;
 
 class DiagnoseTool : public ::testing::Test {
  protected:
@@ -30,11 +31,11 @@ class DiagnoseTool : public ::testing::Test {
     return run.exit_code == 0 ? json::parse(content(path("r.json"))) : json();
   }
   /// The first hours of the shift with the first charge; its diagnosis takes a third of the time.
-  std::string morning() const {
+  std::string morning(int most_rows = 12'000) const {
     std::istringstream lines(content(shift));
     std::ofstream out(path("morning.csv"));
     int rows = 0;
-    for (std::string line; rows < 12'000 && std::getline(lines, line);) {
+    for (std::string line; rows < most_rows && std::getline(lines, line);) {
       out << line << "\n";
       rows += line.starts_with("#") ? 0 : 1;
     }
@@ -63,10 +64,7 @@ class DiagnoseTool : public ::testing::Test {
 constexpr const char* hysteresis = "ocv_hysteresis:half_gap_v=0.015,decay=40";
 
 TEST_F(DiagnoseTool, NamesAHysteresisWithItsSizeAndConfirmsItOnAHoldOut) {
-  const std::string later = simulated("later.csv", hysteresis, 2, "0.9");
-  std::string text = content(later);
-  text.replace(text.find(",soc"), 4, ",soc_ref");
-  std::ofstream(later) << text;
+  const std::string later = simulated("later.csv", hysteresis, 2, "0.9");  // its soc_ref says where it starts
   const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", hysteresis) +
                         " --holdout " + later + " --out " + path("x.toml"));
   EXPECT_EQ(r["verdict"], "CAUSE");
@@ -167,11 +165,11 @@ TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
         name, 2'000, 1, [](int) { return 0.0; }, [&](int k) { return 3.286 + above_v + 0.001 * (k % 2); });
   };
   const ToolRun run =
-      run_tool("diagnose --cell table9 --initial-soc 0.5 --recording " + rest("now.csv", 0) + " --holdout " +
-               rest("same.csv", 0) + " " + rest("higher.csv", 0.1) + " --json " + path("r.json"));
+      run_tool("diagnose --cell table9 --initial-soc 0.5 0.5 0.5 --recording " + rest("now.csv", 0) + " --holdout " +
+               rest("alike.csv", 1e-4) + " " + rest("higher.csv", 0.1) + " --json " + path("r.json"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out,
-              HasSubstr("\nThe 95 % interval of the prediction contains 100.0 % of the readings of same.csv;"));
+              HasSubstr("\nThe 95 % interval of the prediction contains 100.0 % of the readings of alike.csv;"));
   EXPECT_THAT(run.out,
               HasSubstr("\nThe 95 % interval of the prediction contains 0.0 % of the readings of higher.csv;"));
   const json r = json::parse(content(path("r.json")));
@@ -285,14 +283,97 @@ TEST_F(DiagnoseTool, ABrokenRecordingIsADataFaultWithItsPlace) {
   EXPECT_EQ(r["statement"], r["faults"][0]["text"]);
 }
 
-TEST_F(DiagnoseTool, WarnsOfTheSourceOfTheInitialSoc) {
+TEST_F(DiagnoseTool, SaysWhereTheInitialSocComesFrom) {
   const json referenced = result("--cell table9 --recording " + shift);
-  EXPECT_THAT(referenced["warnings"].dump(), HasSubstr("starts at the first value of soc_ref, 98.0 %"));
-  const json read = result("--cell table9 --recording " + simulated("now.csv", hysteresis));
-  EXPECT_THAT(read["warnings"].dump(), HasSubstr("starts at the state of charge estimated from the first voltage"));
+  EXPECT_THAT(referenced["notes"].dump(), HasSubstr("starts at the first value of soc_ref, 98.0 %"));
+  std::string text = content(simulated("now.csv", hysteresis));
+  text.replace(text.find(",soc_ref"), 8, ",other");
+  std::ofstream(path("now.csv")) << text;
+  const json read = result("--cell table9 --recording " + path("now.csv"));
+  EXPECT_THAT(read["notes"].dump(), HasSubstr("starts at the state of charge estimated from the first voltage"));
   EXPECT_GT(read["recordings"][0]["initial_soc_sigma"], 0.005);
-  const json given = result("--cell table9 --initial-soc 0.97 --recording " + shift);
-  EXPECT_EQ(given["recordings"][0]["initial_soc"], 0.97);
+  const json given = result("--cell table9 --initial-soc 0.98 --recording " + shift);
+  EXPECT_EQ(given["recordings"][0]["initial_soc"], 0.98);
+  EXPECT_TRUE(given["notes"].empty());
+  for (const json& r : {referenced, given}) EXPECT_THAT(r["warnings"].dump(), Not(HasSubstr("start")));
+}
+
+TEST_F(DiagnoseTool, AValueForTheRecordingsIsNotTheStartOfAHoldOut) {
+  const std::string now = simulated("now.csv", hysteresis), later = simulated("later.csv", hysteresis, 2, "0.5");
+  const std::string both = "--cell table9 --recording " + now + " --holdout " + later;
+  const json by_column = result(both + " --initial-soc 0.98");
+  EXPECT_NEAR(by_column["holdouts"][0]["initial_soc"], 0.5, 1e-3);
+  EXPECT_LT(by_column["extended"]["holdout"]["rmse_v"], 0.003);
+  const json by_user = result(both + " --initial-soc 0.98 0.51");
+  EXPECT_EQ(by_user["holdouts"][0]["initial_soc"], 0.51);
+  const ToolRun wrong = run_tool("diagnose " + both + " --initial-soc 0.98 0.5 0.6");
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_THAT(wrong.err, HasSubstr("--initial-soc:1: 3 values for 1 recordings and 1 hold-outs, expected one for all"));
+}
+
+TEST_F(DiagnoseTool, FindsAWrongStartOfAnySizeAndSaysSoBeforeTheSearch) {
+  const std::string now = simulated("now.csv", "initial_soc:shift=0");
+  const ToolRun run =
+      run_tool("diagnose --cell table9 --recording " + now + " --initial-soc 0.3 --json " + path("r.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("the start of 30.0 % (--initial-soc) is contradicted: the column soc_ref begins at "
+                                 "98.0 % and the first voltage, 3."));
+  const json r = json::parse(content(path("r.json")));
+  EXPECT_EQ(r["verdict"], "CAUSE") << r["statement"];
+  ASSERT_EQ(r["mechanisms"].size(), 1U) << r["statement"];
+  EXPECT_EQ(r["mechanisms"][0]["id"], "initial_soc");
+  EXPECT_NEAR(r["mechanisms"][0]["parameters"][0]["value"], 0.68, 0.01);
+}
+
+TEST_F(DiagnoseTool, RefusesReadingsThatItHasAlready) {
+  const std::string now = simulated("now.csv", hysteresis);
+  std::ofstream(path("copy.csv")) << content(now);
+  for (const std::string& again : {" --holdout " + now, " --recording " + now, " --holdout " + path("copy.csv")}) {
+    const ToolRun run = run_tool("diagnose --cell table9 --recording " + now + again);
+    EXPECT_EQ(run.exit_code, 2) << again;
+    EXPECT_THAT(run.err, HasSubstr("the same readings as in " + now + ", expected another recording")) << again;
+  }
+}
+
+TEST_F(DiagnoseTool, TheErrorOfAHoldOutIsThatOfTheOtherCommands) {
+  for (const char* cell : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
+    const std::string with = std::string(" --cell ") + cell;
+    ASSERT_EQ(run_tool("simulate" + with + " --recording " + morning(3'000) + " --initial-soc 1 --out " + path("z.csv"))
+                  .exit_code,
+              0);
+    const ToolRun replay = run_tool("replay " + path("z.csv") + with + " --json -");
+    ASSERT_EQ(replay.exit_code, 0) << replay.err;
+    EXPECT_LT(json::parse(replay.out)["voltage"]["open_loop_rmse_v"], 1e-6) << cell;
+    EXPECT_THAT(replay.err, Not(HasSubstr("not used")));
+    const json r = result("--recording " + path("z.csv") + with);
+    EXPECT_EQ(r["verdict"], "NO_MISMATCH") << r["statement"];
+    EXPECT_LT(r["baseline"]["recording"]["rmse_v"], 1e-6) << cell;
+  }
+}
+
+TEST_F(DiagnoseTool, AHoldOutThatThePredictionMissesChangesTheHeadline) {
+  const json r = result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", "initial_soc:shift=0") +
+                        " --holdout " + simulated("later.csv", "resistance_growth:fraction=0.3", 2) + " --report " +
+                        path("r.html"));
+  EXPECT_EQ(r["verdict"], "NO_MISMATCH");
+  ASSERT_EQ(r["holdouts_beyond"].size(), 1U);
+  EXPECT_EQ(r["holdouts_beyond"][0], "later.csv");
+  const std::string statement = r["statement"];
+  EXPECT_THAT(statement, HasSubstr("No action is needed for this recording. But the prediction of the hold-out "
+                                   "later.csv is off by "));
+  EXPECT_THAT(statement, HasSubstr("Diagnose both together."));
+  EXPECT_THAT(content(path("r.html")), HasSubstr("Diagnose the recordings and the hold-outs together:"));
+  EXPECT_THAT(content(path("r.html")), HasSubstr("\"holdouts_beyond\":[\"later.csv\"]"));
+}
+
+TEST_F(DiagnoseTool, AnExtendedFileThatPredictsTheHoldOutWorseSaysSo) {
+  const json r =
+      result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", "resistance_growth:fraction=0.3") +
+             " --holdout " + simulated("later.csv", "initial_soc:shift=0", 2) + " --out " + path("x.toml"));
+  EXPECT_EQ(r["verdict"], "CAUSE");
+  EXPECT_THAT(r["warnings"].dump(), HasSubstr("holdout_worse"));
+  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("do not rely on that file"));
+  EXPECT_THAT(content(path("x.toml")), HasSubstr("; the error on the hold-out recordings increases from "));
 }
 
 /// A voltage offset, which a gain explains as well on an LFP cell; then the sense wires on a reference source.

@@ -160,7 +160,7 @@ TEST(RealRecording, ContactsThatTheCellFileDoesNotContainAreNamedMeasuredAndMode
       0);
   const ToolRun run =
       run_tool("diagnose --quiet --cell " + cell + " --recording " + recordings +
-               "d003_load.csv.gz --initial-soc 1 --holdout " + recordings + "d056_load.csv.gz --json " + result);
+               "d003_load.csv.gz --initial-soc 1 1 --holdout " + recordings + "d056_load.csv.gz --json " + result);
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const json r = json::parse(content(result));
   EXPECT_EQ(r["verdict"], "CAUSE");

@@ -120,7 +120,7 @@ TEST_F(Tool, AReplayOfASimulatedProfileReproducesItsStateOfCharge) {
   ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 0.95 --out " + path("s.csv"))
                 .exit_code,
             0);
-  EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
+  EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc,soc_ref\n"));
   const ToolRun run = run_tool("replay " + path("s.csv") + " --initial-soc 0.95 --json -");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   // The voltage is the model's own, written with ten digits and read in microvolts. The first one moves the start a
@@ -254,11 +254,11 @@ TEST_F(Tool, ASimulationWithItsIntervalStatesHowManyReadingsItContains) {
   ASSERT_EQ(run_tool(simulate + path("plain.csv")).exit_code, 0);
   EXPECT_THAT(content(path("r.json")), HasSubstr("\"coverage\": null"));
   EXPECT_THAT(content(path("r.html")), Not(HasSubstr("95 % interval")));
-  EXPECT_TRUE(content(path("plain.csv")).starts_with("time_s,current_a,voltage_v,soc\n"));
+  EXPECT_TRUE(content(path("plain.csv")).starts_with("time_s,current_a,voltage_v,soc,soc_ref\n"));
   const ToolRun run = run_tool(simulate + path("s.csv") + " --interval");
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const std::string csv = content(path("s.csv"));
-  EXPECT_TRUE(csv.starts_with("time_s,current_a,voltage_v,soc,voltage_std_v\n"));
+  EXPECT_TRUE(csv.starts_with("time_s,current_a,voltage_v,soc,voltage_std_v,soc_ref\n"));
   EXPECT_THAT(content(path("r.html")), HasSubstr("simulated with its 95 % interval, V"));
   EXPECT_THAT(run.out, HasSubstr("The 95 % interval of the prediction contains "));
   EXPECT_THAT(run.out, HasSubstr(" % of the readings of r.csv;"));
@@ -288,7 +288,8 @@ TEST_F(Tool, AnIntervalNeedsNoMeasuredVoltageAndIsNotThatOfAPack) {
       run_tool("simulate --cell table9 --profile " + profile + " --interval --json - --out " + path("s.csv"));
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("\"coverage\": null"));
-  EXPECT_TRUE(content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc,temperature_c,voltage_std_v\n"));
+  EXPECT_TRUE(
+      content(path("s.csv")).starts_with("time_s,current_a,voltage_v,soc,temperature_c,voltage_std_v,soc_ref\n"));
   for (const auto& row : table_of(content(path("s.csv")))) EXPECT_GT(row[5], 0.001);
   const std::string refused =
       "simulate --cell table9 --recording " + pack + " --interval --quiet --out " + path("x.csv");

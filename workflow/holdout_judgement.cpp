@@ -1,0 +1,84 @@
+#include "workflow/holdout_judgement.hpp"
+
+#include <fmt/format.h>
+
+#include "diagnosis/quantity_text.hpp"
+#include "diagnosis/texts.hpp"
+#include "workflow/next_steps.hpp"
+
+namespace bms::workflow {
+
+namespace {
+
+constexpr double significant_increase = 1.05;  ///< of an error on the hold-outs, before a warning says so
+
+using diagnosis::millivolts;
+
+std::string interval_text(const diagnosis::Coverage& c) {
+  return fmt::format("{} RMS, and its {:.0f} % interval contains {:.1f} % of the readings", millivolts(c.error_v()),
+                     100 * diagnosis::nominal_coverage, 100 * c.share());
+}
+
+/// What the verdict says of a hold-out that it does not hold for.
+std::string consequence(const DiagnoseResult& r) {
+  if (r.named()) return "the findings do not describe it.";
+  return "something is there that this recording does not show.";
+}
+
+void add_contradiction(const DiagnoseOptions& options, DiagnoseResult& r) {
+  const diagnosis::Verdict verdict = r.diagnosis.verdict;
+  if (!r.named() && !r.has_term() && verdict != diagnosis::Verdict::no_mismatch) return;  // nothing is stated of others
+  const RecordingComparison* worst = nullptr;
+  for (const RecordingComparison& c : r.holdouts) {
+    if (!c.interval.coverage.is_beyond(r.diagnosis.noise_floor_v)) continue;
+    r.holdouts_beyond.push_back(c.record.name);
+    if (worst == nullptr || c.interval.coverage.error_v() > worst->interval.coverage.error_v()) worst = &c;
+  }
+  if (worst == nullptr) return;
+  r.together = together_command(options, r.recordings, r.holdouts);
+  std::string& statement = r.diagnosis.statement;
+  constexpr std::string_view nothing_to_do = diagnosis::no_action;
+  if (verdict == diagnosis::Verdict::no_mismatch && statement.ends_with(nothing_to_do)) {
+    statement.resize(statement.size() - nothing_to_do.size());
+    statement += "No action is needed for this recording.";
+  }
+  statement += fmt::format(" But the prediction of the hold-out {} is off by {}: {} Diagnose both together.",
+                           worst->record.name, interval_text(worst->interval.coverage), consequence(r));
+}
+
+/// The extended cell predicts the hold-outs worse.
+void add_increase(DiagnoseResult& r) {
+  if (!r.named() && !r.has_term()) return;
+  if (!r.baseline_holdout || !r.extended_holdout ||
+      !(r.extended_holdout->rmse_v > significant_increase * r.baseline_holdout->rmse_v))
+    return;
+  const std::string increase =
+      fmt::format("from {:.1f} mV to {:.1f} mV", 1e3 * r.baseline_holdout->rmse_v, 1e3 * r.extended_holdout->rmse_v);
+  r.warnings.push_back({"holdout_worse", "with the extended cell file the error on the hold-out recordings increases " +
+                                             increase + ": do not rely on it"});
+  r.diagnosis.statement += fmt::format(
+      " With the extended cell file the error on the hold-out recordings increases {}: do not rely on that file.",
+      increase);
+  r.extended_cell.source += fmt::format("; the error on the hold-out recordings increases {}", increase);
+}
+
+/// The estimated state of charge becomes worse with the findings, and by more than its own uncertainty.
+void add_soc_increase(DiagnoseResult& r) {
+  if ((!r.named() && !r.has_term()) || !r.soc) return;
+  const SocErrors& soc = *r.soc;
+  if (!(soc.extended_rmse > significant_increase * soc.baseline_rmse && soc.extended_rmse > soc.extended_sigma)) return;
+  r.warnings.push_back(
+      {"soc_worse", fmt::format("with the findings the error of the estimated state of charge increases from {:.2f} % "
+                                "to {:.2f} %, more than its standard deviation of {:.2f} %",
+                                100 * soc.baseline_rmse, 100 * soc.extended_rmse, 100 * soc.extended_sigma)});
+}
+
+}  // namespace
+
+void judge_holdouts(const DiagnoseOptions& options, DiagnoseResult& r) {
+  add_contradiction(options, r);
+  add_increase(r);
+  add_soc_increase(r);
+}
+
+}  // namespace bms::workflow
