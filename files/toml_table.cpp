@@ -1,6 +1,7 @@
 #include "files/toml_table.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 
 #include <fmt/format.h>
@@ -30,11 +31,28 @@ struct TomlTable::Node {
     throw BadInput(file, value.source().begin.line, "'" + full_name(key) + "' is not acceptable, expected " + expected);
   }
 
+  /// A key of the table that differs from this one only in capital letters, '-' and '_'; empty if no key does.
+  std::string alike_of(const std::string& key) const {
+    const auto plain = [](std::string_view text) {
+      std::string letters;
+      for (const char c : text) {
+        if (c != '_' && c != '-') letters += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      }
+      return letters;
+    };
+    for (const auto& [other, value] : *table) {
+      if (plain(other.str()) == plain(key)) return std::string(other.str());
+    }
+    return "";
+  }
+
   const toml::node& required(const std::string& key, const std::string& expected) const {
     const toml::node* value = table->get(key);
     if (value == nullptr) {
+      const std::string alike = alike_of(key);
       throw BadInput(file, std::max<std::size_t>(table->source().begin.line, 1),
-                     "'" + full_name(key) + "' is missing, expected " + expected);
+                     "'" + full_name(key) + "' is missing" + (alike.empty() ? "" : " ('" + alike + "' is there)") +
+                         ", expected " + expected);
     }
     return *value;
   }

@@ -10,6 +10,7 @@
 #include "files/bad_input.hpp"
 #include "files/logs/dbc.hpp"
 #include "files/logs/frame_text.hpp"
+#include "files/logs/own_frames.hpp"
 #include "files/logs/table_layout.hpp"
 #include "files/logs/table_reader.hpp"
 #include "files/logs/text_lines.hpp"
@@ -23,6 +24,7 @@ constexpr std::array frame_formats = {"candump", "battery-emulator", "asc", "gvr
 constexpr std::size_t sniffed_lines = 20;
 constexpr std::size_t fewest_rows = 10;
 constexpr double stale_s = 10;  ///< an older value is missing
+constexpr double longest_without_voltage_s = 1;
 
 /// A signal and the column that it fills.
 struct MappedSignal {
@@ -35,16 +37,40 @@ struct MappedSignal {
   std::size_t count = 0;
 };
 
+/// The mean of the readings that are there.
+struct MeanReading {
+  double sum = 0;
+  std::size_t rows = 0, readings = 0;
+
+  void add(double value) {
+    ++rows;
+    if (std::isnan(value)) return;
+    sum += value;
+    ++readings;
+  }
+  double mean() const {
+    return readings == 0 ? std::numeric_limits<double>::quiet_NaN() : sum / static_cast<double>(readings);
+  }
+};
+
 class FrameLog {
  public:
   FrameLog(std::string path, const ReadOptions& options) : path_(std::move(path)), options_(options) {
+    std::vector<std::string> mapped = options.map;
     if (options.dbc.empty()) {
-      throw BadInput(path_, 1,
-                     "a log of CAN frames, expected --dbc with the file that describes them, and --map "
-                     "current_a=SIGNAL, --map voltage_v=SIGNAL");
+      const std::vector<std::string> own = own_map_of(path_, is_frame_format(options.format) ? options.format : "");
+      if (own.empty()) {
+        throw BadInput(path_, 1,
+                       "a log of CAN frames, expected --dbc with the file that describes them, and --map "
+                       "current_a=SIGNAL, --map voltage_v=SIGNAL");
+      }
+      own_ = true;
+      if (mapped.empty()) mapped = own;
+      by_samples_ = options.map.empty();
     }
-    dbc_ = read_dbc(options.dbc);
-    for (const std::string& text : options.map) map(text);
+    dbc_name_ = own_ ? own_dbc_name : options.dbc;
+    dbc_ = own_ ? parse_dbc(own_dbc, own_dbc_name) : read_dbc(options.dbc);
+    for (const std::string& text : mapped) map(text);
     if (index_of(Quantity::current) == signals_.size())
       throw BadInput("--map", 1, "no signal for current_a, expected --map current_a=SIGNAL with a signal of the DBC");
   }
@@ -77,11 +103,10 @@ class FrameLog {
     for (const DbcSignal& s : dbc_) {
       if (s.name != name && s.message + "." + s.name != name) continue;
       if (found != nullptr)
-        throw BadInput(options_.dbc, 1, in_quotes(name) + " is in several messages, expected MESSAGE.SIGNAL");
+        throw BadInput(dbc_name_, 1, in_quotes(name) + " is in several messages, expected MESSAGE.SIGNAL");
       found = &s;
     }
-    if (found == nullptr)
-      throw BadInput(options_.dbc, 1, "no signal " + in_quotes(name) + ", expected one of this file");
+    if (found == nullptr) throw BadInput(dbc_name_, 1, "no signal " + in_quotes(name) + ", expected one of this file");
     MappedSignal mapped;
     mapped.signal = *found;
     mapped.target = *target;
@@ -106,6 +131,7 @@ class FrameLog {
   }
 
   void receive(const TextFrame& frame) {
+    if (own_ && !is_own_frame(frame)) return;
     const std::span<const std::uint8_t> data(frame.data.data(), frame.length);
     bool current = false;
     for (MappedSignal& m : signals_) {
@@ -114,7 +140,8 @@ class FrameLog {
           (!fits(*m.multiplexor, frame.length) ||
            raw_value(*m.multiplexor, data) != static_cast<std::uint64_t>(m.signal.multiplexed_by)))
         continue;
-      m.value = m.scale(value_of(m.signal, data));
+      m.value =
+          is_missing(m.signal, data) ? std::numeric_limits<double>::quiet_NaN() : m.scale(value_of(m.signal, data));
       if (std::abs(m.value) > largest_reading) {
         throw BadInput(path_, 1,
                        fmt::format("{} = {:g} at {:g} s is impossible, expected values from -{:g} to {:g}",
@@ -123,8 +150,25 @@ class FrameLog {
       m.received_s = frame.time_s;
       ++m.count;
       current = current || m.target.quantity == Quantity::current;
+      voltage_ = voltage_ || m.target.quantity == Quantity::voltage || m.target.quantity == Quantity::cell_voltage;
     }
-    if (current) add_row(frame.time_s);
+    if (by_samples_) {
+      if (current) mean_current_.add(signals_[index_of(Quantity::current)].value);
+      end_sample(frame);
+    } else if (current) {
+      add_row(frame.time_s);
+    }
+  }
+
+  /// Of the battery's own frames a row is what belongs to one sample: its voltages, and the mean current since the row
+  /// before. Without voltages there is a row a second.
+  void end_sample(const TextFrame& frame) {
+    if (!ends_a_sample(frame) || mean_current_.rows == 0) return;
+    if (!voltage_ && !time_s_.empty() && frame.time_s - time_s_.back() < longest_without_voltage_s) return;
+    signals_[index_of(Quantity::current)].value = mean_current_.mean();
+    add_row(frame.time_s);
+    mean_current_ = {};
+    voltage_ = false;
   }
 
   void add_row(double time_s) {
@@ -158,12 +202,12 @@ class FrameLog {
   measurement::Recording finish(const std::string& format, const std::string& encoding) {
     measurement::Recording r;
     r.path = path_;
-    r.read_as = format + (encoding.empty() ? "" : ", " + encoding) + " with " + options_.dbc;
+    r.read_as = format + (encoding.empty() ? "" : ", " + encoding) + " with " + dbc_name_;
     for (const MappedSignal& m : signals_) {
       if (m.count == 0) {
         throw BadInput(path_, 1,
                        fmt::format("no frame with {}.{} (id {:X}), expected a log of the bus that {} describes",
-                                   m.signal.message, m.signal.name, m.signal.id, options_.dbc));
+                                   m.signal.message, m.signal.name, m.signal.id, dbc_name_));
       }
       r.read_as += fmt::format("; {} from {}.{} in {}", name_of(m.target), m.signal.message, m.signal.name,
                                m.signal.unit.empty() ? "a unit that is not stated" : m.signal.unit);
@@ -220,6 +264,11 @@ class FrameLog {
 
   std::string path_;
   const ReadOptions& options_;
+  bool own_ = false;         ///< the battery's own frames
+  bool by_samples_ = false;  ///< a row for each of its samples
+  bool voltage_ = false;     ///< one was received since the last row
+  MeanReading mean_current_;
+  std::string dbc_name_;
   std::vector<DbcSignal> dbc_;
   std::vector<MappedSignal> signals_;
   std::vector<double> time_s_;

@@ -1,4 +1,5 @@
-// Recordings from logs of foreign CAN frames: a DBC file describes the frames, the user names the signals.
+// Recordings from logs of CAN frames: a DBC file describes the frames, the user names the signals. The battery's own
+// frames (can/greybox_bms.dbc) need neither.
 #pragma once
 
 #include <optional>
@@ -13,8 +14,10 @@ namespace bms::files {
 /// one. Throws BadInput if the file cannot be read.
 std::optional<std::string> frame_format_of(const std::string& path, const ReadOptions& options);
 
-/// Each frame with the current makes a row: its time, its current, and the last value of every other signal. bytes:
-/// gets the size of the text. Throws BadInput if there is no DBC file, a signal is unknown, or its frames are missing.
+/// Each frame with the current makes a row: its time, its current, and the last value of every other signal. A value
+/// that means "not available" (files/logs/dbc.hpp) is missing. Without a DBC file the log must be one of the battery's
+/// own: a row is then a sample whose voltages were sent, with the mean current since the row before. bytes: gets the
+/// size of the text. Throws BadInput if nothing describes the frames, a signal is unknown, or its frames are missing.
 measurement::Recording read_frame_log(const std::string& path, const ReadOptions& options, std::size_t& bytes);
 
 /// The lines "NAME=VALUE" of a mapping file; comments begin with '#'. Throws BadInput.

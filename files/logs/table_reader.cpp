@@ -31,6 +31,8 @@ struct FileColumn {
   const SourceColumn* source = nullptr;
   std::string name;
   bool sparse = false;  ///< a field may be empty without a warning
+  bool read = false;    ///< a field was not empty
+  std::size_t missing = 0, empty = 0, first_missing_line = 0;
 };
 
 class TableReader {
@@ -214,7 +216,7 @@ class TableReader {
   }
 
   void take(std::size_t k, std::string_view field) {
-    const FileColumn& column = columns_[k];
+    FileColumn& column = columns_[k];
     if (column.into != nullptr)
       column.into->push_back(column.source->target.quantity == Quantity::time ? time(field, column)
                                                                               : value(field, column));
@@ -256,10 +258,10 @@ class TableReader {
     return column.source->scale(*v);
   }
 
-  double value(std::string_view field, const FileColumn& column) {
+  double value(std::string_view field, FileColumn& column) {
     auto v = number(field, point_);
     if (!v && trimmed(field).empty()) {
-      if (!column.sparse) ++empty_;
+      ++column.empty;
       v = missing_value;
     }
     if (!v)
@@ -268,19 +270,39 @@ class TableReader {
       refuse(fmt::format("{} in column '{}' is impossible", in_quotes(field), column.name),
              fmt::format("a value from -{:g} to {:g}, or nan", largest_reading, largest_reading));
     }
-    if (std::isnan(*v) && !column.sparse && missing_++ == 0) first_missing_line_ = lines_.number();
+    if (std::isnan(*v)) {
+      if (column.missing++ == 0) column.first_missing_line = lines_.number();
+    } else {
+      column.read = true;
+    }
     return column.source->scale.neutral() ? *v : column.source->scale(*v);
+  }
+
+  /// A column of which every field is empty is not there: a table has columns for more cells than the pack.
+  void warn_of_missing() {
+    std::size_t missing = 0, empty = 0, first_line = 0;
+    for (const FileColumn& c : columns_) {
+      if (c.sparse || c.missing == 0 || (!c.read && numbered(c))) continue;
+      missing += c.missing;
+      empty += c.empty;
+      if (first_line == 0 || c.first_missing_line < first_line) first_line = c.first_missing_line;
+    }
+    if (missing == 0) return;
+    recording_.warnings.push_back(
+        {"missing_reading", fmt::format("readings that are {}: {}, the first in line {}; they are treated as missing",
+                                        empty == 0 ? "'nan'" : "empty or 'nan'", missing, first_line)});
+  }
+  static bool numbered(const FileColumn& c) {
+    if (c.source == nullptr) return false;
+    const Quantity q = c.source->target.quantity;
+    return q == Quantity::cell_voltage || q == Quantity::cell_temperature || q == Quantity::pack_voltage;
   }
 
   void finish() {
     Recording& r = recording_;
     if (r.rows() < minimum_rows) refuse(fmt::format("{} rows", r.rows()), fmt::format("{} or more", minimum_rows));
     if (r.duration_s() <= 0) refuse("all rows have the same time", "times that increase");
-    if (missing_ > 0) {
-      r.warnings.push_back(
-          {"missing_reading", fmt::format("readings that are {}: {}, the first in line {}; they are treated as missing",
-                                          empty_ == 0 ? "'nan'" : "empty or 'nan'", missing_, first_missing_line_)});
-    }
+    warn_of_missing();
     if (r.time_s.front() > first_epoch_ms && options_.refuse_doubtful) {
       throw BadInput(r.path, 1, "the times look like milliseconds since 1970, expected seconds: --unit time_s=ms");
     }
@@ -304,7 +326,6 @@ class TableReader {
   std::size_t last_used_ = 0, state_index_ = std::numeric_limits<std::size_t>::max();
   bool discharges_ = false;
   std::optional<double> epoch_s_;
-  std::size_t missing_ = 0, empty_ = 0, first_missing_line_ = 0;
   Recording recording_;
 };
 
@@ -330,7 +351,23 @@ Recording read_table(TextLines& lines, const std::string& path, VoltageColumn vo
   return TableReader(lines, path, options).read(voltage);
 }
 
+namespace {
+
+bool has_no_reading(const measurement::Column& c) {
+  return std::all_of(c.begin(), c.end(), [](double v) { return std::isnan(v); });
+}
+
+/// Removes the last columns that have no reading: a log may have columns for more cells than the pack.
+void drop_absent(std::vector<measurement::Column>& columns) {
+  while (!columns.empty() && has_no_reading(columns.back())) columns.pop_back();
+}
+
+}  // namespace
+
 void complete_pack(Recording& r, const ReadOptions& options) {
+  drop_absent(r.cell_voltage_v);
+  drop_absent(r.cell_temperature_c);
+  if (!r.pack_voltage_v.empty() && has_no_reading(r.pack_voltage_v)) r.pack_voltage_v = measurement::Column{};
   if (!r.cell_temperature_c.empty() && r.temperature_c.empty()) r.temperature_c = mean_of(r.cell_temperature_c);
   if (!r.voltage_v.empty()) return;
   if (!r.cell_voltage_v.empty()) {

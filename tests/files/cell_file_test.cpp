@@ -206,6 +206,8 @@ TEST(CellFile, RejectsMissingMisspeltAndWronglyTypedKeys) {
               HasSubstr("expected a number"));
   EXPECT_THAT(cell_refusal(replaced(good, "capacity_ah = 6.0", "capacity_mah = 6000")),
               HasSubstr("'capacity_ah' is missing"));
+  EXPECT_THAT(cell_refusal(replaced(good, "r0_ohm", "r0_Ohm")),
+              HasSubstr("'rc.r0_ohm' is missing ('r0_Ohm' is there), expected"));
   EXPECT_THAT(cell_refusal(replaced(good, "model_v = 0.003", "model_v = 0.003\nmodell_v = 0.003")),
               HasSubstr("unknown key 'noise.modell_v'"));
   EXPECT_THAT(cell_refusal(replaced(good, "0.7,  0.8,   0.9,   1.0]", "0.7,  0.8,   0.9]")), HasSubstr("ocv"));

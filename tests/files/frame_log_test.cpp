@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "can/codec.hpp"
 #include "files/logs/dbc.hpp"
 #include "files/logs/frame_text.hpp"
 #include "files/recording.hpp"
@@ -74,6 +75,8 @@ TEST_F(FrameLogFiles, AreReadIfTheyAreWhole) {
   EXPECT_EQ(r.rows(), 12U);
   EXPECT_DOUBLE_EQ(r.current_a[0], -2.4);
   EXPECT_DOUBLE_EQ(r.voltage_v[0], 3.3);
+  const std::string in_volts = " SG_ U : 16|16@1+ (0.001,0) [0|0] \"V\" X\n";
+  EXPECT_EQ(read(current_signal + in_volts, frames("10FFD80C")).voltage_v[0], 3.288) << "not 3.2880000000000003";
 }
 
 TEST_F(FrameLogFiles, WithTimesThatAreNoNumbersHaveNoFrames) {
@@ -90,6 +93,22 @@ TEST_F(FrameLogFiles, WithValuesThatNoSensorHasAreRefused) {
       " SG_ I : 0|32@1- (1,0) [0|0] \"A\" X\n SG_ U : 32|16@1+ (1,0) [0|0] \"mV\" X\nSIG_VALTYPE_ 291 I : 1;\n";
   EXPECT_THAT(refused(as_double, frames("0000807FE40C")), HasSubstr("is impossible")) << "infinity";
   EXPECT_TRUE(std::isnan(read(as_double, frames("0000C07FE40C")).current_a[3])) << "not a number: a missing reading";
+}
+
+/// What a DBC file states about a value that is sent for "not available", and what J1939 does without it.
+TEST_F(FrameLogFiles, WithValuesThatAreNotAvailableHaveMissingReadings) {
+  const std::string in_range =
+      " SG_ I : 0|16@1- (0.01,0) [-300|300] \"A\" X\n SG_ U : 16|16@1+ (1,0) [0|5000] \"mV\" X\n";
+  EXPECT_DOUBLE_EQ(read(in_range, frames()).voltage_v[3], 3.3);
+  EXPECT_TRUE(std::isnan(read(in_range, frames("10FF8913")).voltage_v[3])) << "5.001 V is above the range";
+  EXPECT_TRUE(std::isnan(read(in_range, frames("3176E40C")).current_a[3])) << "302.57 A, too";
+  const std::string no_range = std::string(current_signal) + voltage_signal;
+  EXPECT_TRUE(std::isnan(read(no_range, frames("10FFFFFF")).voltage_v[3])) << "all ones";
+  EXPECT_TRUE(std::isnan(read(no_range, frames("0080E40C")).current_a[3])) << "the lowest number of 16 bits";
+  EXPECT_DOUBLE_EQ(read(no_range, frames("FFFFE40C")).current_a[3], -0.01) << "all ones of a signed signal are -1";
+  EXPECT_DOUBLE_EQ(read(no_range, frames("10FF8913")).voltage_v[3], 5.001) << "[0|0] states no range";
+  const std::string invalid = no_range + "BA_ \"Invalid\" SG_ 291 U \"3300\";\n";
+  EXPECT_TRUE(std::isnan(read(invalid, frames()).voltage_v[3]));
 }
 
 /// The multiplexor lies behind the end of these frames: nobody knows which signals they have.
@@ -110,6 +129,60 @@ TEST_F(FrameLogFiles, WithADbcFileThatIsNoneAreRefused) {
     const std::string dbc = fmt::format(" SG_ I : 0|16@1- ({}) [0|0] \"A\" X\n", scale);
     EXPECT_THAT(refused(dbc + voltage_signal, frames()), HasSubstr("not a line")) << scale;
   }
+}
+
+/// The battery's own frames: a sample a second, the cell voltages with each, an Identity with the first.
+class OwnFrameLog : public FrameLogFiles {
+ protected:
+  static std::string line(double time_s, can::Frame frame) {
+    can::protect(frame, static_cast<std::uint16_t>(frame.id), 0);
+    std::string text = fmt::format("({:.6f}) can0 {:03X}#", time_s, frame.id);
+    for (const std::uint8_t byte : frame.data) text += fmt::format("{:02X}", byte);
+    return text + "\n";
+  }
+  static can::Frame of(std::uint32_t id) {
+    can::Frame frame;
+    frame.id = id;
+    frame.length = 8;
+    return frame;
+  }
+  /// cells: in the frame CellVoltages1, in millivolts; the third is not known in row 5.
+  static std::string text_of(bool identity) {
+    std::string text;
+    for (int k = 0; k < 12; ++k) {
+      can::Frame electrical = of(0x181), cells = of(0x190), status = of(0x182), identity_frame = of(0x183);
+      can::put_raw(electrical, 16, 16, 13'210);                                // 13.21 V
+      can::put_raw(electrical, 32, 16, static_cast<std::uint32_t>(-100 - k));  // in 0.02 A
+      can::put_raw(electrical, 48, 16, 2'150);                                 // 21.5 degrees C
+      for (unsigned c = 0; c < 4; ++c) can::put_raw(cells, 12 + 13 * c, 13, c == 2 && k == 5 ? 8'191 : 3'300 + c);
+      if (identity && k == 0) text += line(k, identity_frame);
+      text += line(k, electrical) + line(k + 0.001, cells) + line(k + 0.002, status);
+    }
+    return text;
+  }
+};
+
+TEST_F(OwnFrameLog, NeedsNoDbcFileAndNoMapping) {
+  const measurement::Recording r = read_recording(file("own.log", text_of(true)));
+  ASSERT_EQ(r.rows(), 12U);
+  ASSERT_EQ(r.cell_voltage_v.size(), 4U);
+  EXPECT_DOUBLE_EQ(r.current_a[3], -2.06);
+  EXPECT_DOUBLE_EQ(r.cell_voltage_v[1][3], 3.301);
+  EXPECT_TRUE(std::isnan(r.cell_voltage_v[2][5])) << "not known";
+  EXPECT_NEAR(r.voltage_v[5], (3.3 + 3.301 + 3.303) / 3, 1e-9) << "the mean of the others";
+  EXPECT_DOUBLE_EQ(r.temperature_c[0], 21.5);
+  EXPECT_DOUBLE_EQ(r.pack_voltage_v[0], 13.21);
+  EXPECT_THAT(r.read_as, HasSubstr("the battery's own messages"));
+}
+
+TEST_F(OwnFrameLog, IsRecognisedByItsIdentityAndReadWithoutDamagedFrames) {
+  EXPECT_THAT(refusal_by("[^:]*", [&] { read_recording(file("foreign.log", text_of(false))); }),
+              HasSubstr("expected --dbc"));
+  std::string damaged = text_of(true);
+  const std::size_t at = damaged.find("(3.000000) can0 181#");
+  damaged[at + 20] = damaged[at + 20] == '0' ? '1' : '0';  // its check code
+  const measurement::Recording r = read_recording(file("damaged.log", damaged));
+  EXPECT_EQ(r.rows(), 11U) << "no row without a current";
 }
 
 }  // namespace
