@@ -80,7 +80,8 @@ Injection parse_injection(const std::string& text, std::size_t cells) {
   if (is_probability && i.value > 1) reject(text, "expected a probability, 0 to 1");
   const double most = static_cast<double>(name == "sense_wire" ? cells - 1 : cells);
   if (kind->value == Value::cell && !(i.value >= 1 && i.value <= most && i.value == static_cast<int>(i.value)))
-    reject(text, fmt::format("expected a cell, 1 to {}", most));
+    reject(text, most > 1 ? fmt::format("expected a cell, 1 to {}", most)
+                          : "this board has one cell; expected cell 1, or more cells with --cells");
   const std::size_t dash = when.find('-');
   i.from_s = number(text, when.substr(0, dash), "seconds");
   if (dash != std::string_view::npos) i.to_s = number(text, when.substr(dash + 1), "seconds");

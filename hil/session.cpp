@@ -16,7 +16,7 @@ namespace bms::hil {
 namespace {
 
 constexpr double longest_wait_for_drive_s = 60;  // then the profile starts although the contactors are open
-constexpr double trace_every_s = 10;
+constexpr double trace_points = 2'000, shortest_trace_s = 1, longest_trace_s = 10;  ///< distance of two points
 constexpr double rest_c_rate = 0.02;        // a recorded current below this is rest
 constexpr double overcurrent_factor = 1.6;  // load of the injection `overcurrent`, by the discharge limit
 constexpr double soc_tolerance = 0.02;      // a published SOC is wrong if it is off by more, and by three sigma
@@ -27,6 +27,10 @@ constexpr double shutdown_s = 20, reclose_request_s = 12;
 
 std::int32_t micro(double value) { return static_cast<std::int32_t>(std::lround(1e6 * value)); }
 
+/// Micro-units as volts or amperes; NaN if the reading is missing.
+double value_of(std::int32_t micro_units) {
+  return micro_units == measurement::no_reading ? std::nan("") : 1e-6 * micro_units;
+}
 std::int32_t reading_of(double value) { return std::isfinite(value) ? micro(value) : measurement::no_reading; }
 
 can::Frame request(protection::Request what, std::uint8_t counter) {
@@ -255,6 +259,10 @@ class Session {
     return frames_for(measured.sample, plan_.cells, measured.link, static_cast<std::uint16_t>(k));
   }
 
+  double trace_every_s() const {
+    return std::clamp(profile_.duration_s() / trace_points, shortest_trace_s, longest_trace_s);
+  }
+
   void judge(const Step& step, const Measured& measured) {
     ++result_.samples;
     result_.duration_s = step.time_s;
@@ -263,17 +271,13 @@ class Session {
                  sigma = 0.01 * static_cast<double>(received_.pack.soc_sigma);
     if (received_.pack_received && std::isfinite(received_.pack.soc) && std::isfinite(measured.soc_true))
       soc_errors_.add(soc - measured.soc_true, sigma);
-    if (!result_.trace.empty() && step.time_s - result_.trace.back().time_s < trace_every_s) return;
-    double lowest_v = std::numeric_limits<double>::infinity(), highest_v = 0;
-    for (std::size_t c = 0; c < plan_.cells; ++c) {
-      lowest_v = std::min(lowest_v, 1e-6 * measured.sample.cell_uv[c]);
-      highest_v = std::max(highest_v, 1e-6 * measured.sample.cell_uv[c]);
-    }
+    if (!result_.trace.empty() && step.time_s - result_.trace.back().time_s < trace_every_s()) return;
+    const auto [lowest_v, highest_v] = voltage_range_v(measured.sample, plan_.cells);
     result_.trace.push_back({.time_s = step.time_s,
                              .soc = soc,
                              .soc_sigma = sigma,
                              .soc_true = measured.soc_true,
-                             .current_a = 1e-6 * measured.sample.current_ua,
+                             .current_a = value_of(measured.sample.current_ua),
                              .lowest_v = lowest_v,
                              .highest_v = highest_v,
                              .dc_link_v = measured.dc_link_v,
@@ -310,6 +314,15 @@ class Session {
 };
 
 }  // namespace
+
+std::pair<double, double> voltage_range_v(const measurement::PackSample<max_cells>& sample, std::size_t cells) {
+  std::pair<double, double> range{std::nan(""), std::nan("")};
+  for (std::size_t c = 0; c < cells; ++c) {
+    const double cell_v = value_of(sample.cell_uv[c]);
+    range = {std::fmin(range.first, cell_v), std::fmax(range.second, cell_v)};  // of a missing reading the other one
+  }
+  return range;
+}
 
 SessionResult run_session(BoardLink& link, const SessionPlan& plan,
                           const std::function<void(double, const can::Frame&)>& frame,

@@ -9,6 +9,7 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "authentication/codes.hpp"
@@ -41,6 +42,10 @@ struct InjectionResult {
   bool in_time = true;
 };
 
+/// Lowest and highest voltage of the first `cells` cells that have a reading; NaN if none has.
+std::pair<double, double> voltage_range_v(const measurement::PackSample<max_cells>& sample, std::size_t cells);
+
+/// A value that is not known is NaN.
 struct TracePoint {
   double time_s, soc, soc_sigma, soc_true, current_a, lowest_v, highest_v, dc_link_v;
   double allowed_charge_a = 0, allowed_discharge_a = 0;  ///< NaN: not published
@@ -58,7 +63,7 @@ struct SessionResult {
   std::optional<double> cut_off_at_s;
   std::vector<FaultEvent> faults;
   std::vector<InjectionResult> injection_results;
-  std::vector<TracePoint> trace;  ///< every ten seconds
+  std::vector<TracePoint> trace;  ///< every one to ten seconds
 };
 
 /// Runs the plan to its end. Calls frame(time_s, f) for each frame that the board sends, and progress(fraction done).

@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "files/bad_input.hpp"
+#include "hil/session.hpp"
 
 namespace bms::hil {
 namespace {
@@ -21,6 +24,12 @@ TEST(Injection, RejectsInvalidTexts) {
                            "cell_stuck=17@3", "cell_stuck=1.5@3", "sense_wire=16@3", "welded=1@3", "welded@",
                            "welded@-1", "welded@5-5", "welded@5-4", "nothing@3"}) {
     EXPECT_THROW(parse_injection(text, 16), files::BadInput) << text;
+  }
+  try {
+    parse_injection("cell_open=3@60", 1);
+    FAIL() << "of a board with one cell";
+  } catch (const files::BadInput& refused) {
+    EXPECT_THAT(refused.what(), testing::HasSubstr("this board has one cell"));
   }
   const auto i = parse_injection("cell_open=3@60.5-90", 16);
   EXPECT_EQ(i.name, "cell_open");
@@ -41,6 +50,16 @@ TEST(Injector, ActsDuringItsIntervalAndOnItsCellOnly) {
     EXPECT_EQ(s.cell_uv[3], whole.cell_uv[3]) << time_s;
     EXPECT_EQ(s.current_ua, inside ? -(3'300'000 + 99) : whole.current_ua) << time_s << ": stuck at the last value";
   }
+}
+
+TEST(TracePoint, AMissingReadingIsNoVoltage) {
+  auto s = reading(3'300'000);
+  s.cell_uv[2] = measurement::no_reading;
+  const auto [low_v, high_v] = voltage_range_v(s, 16);
+  EXPECT_DOUBLE_EQ(low_v, 3.3);
+  EXPECT_DOUBLE_EQ(high_v, 3.300015);
+  s.cell_uv.fill(measurement::no_reading);
+  EXPECT_TRUE(std::isnan(voltage_range_v(s, 16).first));
 }
 
 TEST(Injector, ABrokenSenseWireShiftsTwoNeighboursInOppositeDirectionsAndPreservesTheirSum) {
