@@ -23,7 +23,7 @@ using workflow::amperes;
 using workflow::SensorFinding;
 
 struct AmmeterOptions {
-  std::string recording, cell = "table9";
+  std::string recording, cell = "table9", open_contactors;
   std::optional<double> capacity_sigma;
   double clamp_v = 4, clamp_a = 100;  ///< nominal values of Battery-Emulator's clamp
   files::ReadOptions reading;
@@ -36,6 +36,14 @@ std::string offset_text(const SensorFinding& f) {
   if (!f.value) return f.why;
   return fmt::format("reads {} +- {} too {}{}", amperes(std::abs(f.value->value)), amperes(f.value->std),
                      f.value->value < 0 ? "low" : "high", f.why.empty() ? "" : ", " + f.why);
+}
+
+std::string balance_text(const SensorFinding& f) {
+  if (!f.value) return f.why;
+  if (std::abs(f.value->value) <= 2 * f.value->std)
+    return fmt::format("balanced to {} +- {}", amperes(f.value->value), amperes(f.value->std));
+  return fmt::format("{} by {} +- {}", f.value->value > 0 ? "short" : "over", amperes(std::abs(f.value->value)),
+                     amperes(f.value->std));
 }
 
 std::string gain_text(const SensorFinding& f) {
@@ -58,7 +66,9 @@ std::vector<std::pair<std::string, std::string>> corrections_of(const AmmeterOpt
   const workflow::AmmeterCorrection c = workflow::correction_of(ammeter);
   std::vector<std::pair<std::string, std::string>> lines;
   if (c.empty()) return lines;
-  if (c.offset_a != 0 && !ammeter.offset_a.why.empty()) lines.emplace_back("condition", ammeter.offset_a.why);
+  const bool confirmed = workflow::balance_of(ammeter) == workflow::Balance::by_sensor;
+  if (c.offset_a != 0 && !ammeter.offset_a.why.empty() && !confirmed)
+    lines.emplace_back("condition", ammeter.offset_a.why);
   if (std::abs(c.gain) > most_gain || std::abs(c.offset_a) > most_offset_a) {
     lines.emplace_back("this firmware",
                        "none: more than 5 % or 5 A is a wrong part, not a tolerance; replace the sensor");
@@ -85,14 +95,62 @@ std::vector<std::pair<std::string, std::string>> corrections_of(const AmmeterOpt
   return lines;
 }
 
-std::string statement_of(const Ammeter& a) {
+/// What may be the cause of a charge balance that is off, if it is not the sensor.
+std::string cell_causes(const Ammeter& a) {
+  return a.balance_a.value->value > 0
+             ? "the cell loses it (leakage, internal short circuit), or its capacity is less than that of the cell file"
+             : "the capacity of the cell is another than that of the cell file";
+}
+
+/// Of a balance that is off, and no reading without current that explains it.
+std::string undecided_text(const Ammeter& a, const std::string& recording) {
+  std::string text =
+      fmt::format("The charge balance is {}: the sensor reads that much too {}, or {}.", balance_text(a.balance_a),
+                  a.balance_a.value->value > 0 ? "high" : "low", cell_causes(a));
+  if (a.offset_a.value) text += fmt::format(" At rest the sensor {}.", offset_text(a.offset_a));
+  return text + fmt::format(
+                    " Before anything is corrected, record the sensor for ten minutes with the contactors open, then: "
+                    "bms ammeter {} --open-contactors FILE",
+                    recording);
+}
+
+std::string statement_of(const AmmeterOptions& o, const Ammeter& a) {
   if (a.clipping_a.value) return fmt::format("The current sensor is clipped {}.", clipping_text(a.clipping_a));
-  if (!a.offset_a.value) return "This log does not show the offset of the current sensor: " + a.offset_a.why + ".";
+  const workflow::Balance balance = workflow::balance_of(a);
+  if (balance == workflow::Balance::undecided) return undecided_text(a, o.recording);
+  if (balance == workflow::Balance::by_cell)
+    return fmt::format(
+        "The charge balance is {}, but with {} the sensor {}. So {}. Do not correct the sensor for it; "
+        "bms diagnose names the cause.",
+        balance_text(a.balance_a), a.open_contactors ? "open contactors" : "no load", offset_text(a.offset_a),
+        cell_causes(a));
+  if (!a.offset_a.value) {
+    if (balance == workflow::Balance::balanced)
+      return fmt::format("The charge is {}: no correction.", balance_text(a.balance_a));
+    return "This log does not show the offset of the current sensor: " + a.offset_a.why + ".";
+  }
   std::string text = fmt::format("The current sensor {}", offset_text(a.offset_a));
+  if (balance == workflow::Balance::by_sensor) text += "; the charge balance shows the same";
   if (a.gain.value) text += fmt::format("; it {}", gain_text(a.gain));
   text += ".";
   if (workflow::correction_of(a).empty()) text += " That is within two standard deviations: no correction.";
   return text;
+}
+
+const char* name_of(workflow::Balance balance) {
+  switch (balance) {
+    case workflow::Balance::missing:
+      return "missing";
+    case workflow::Balance::balanced:
+      return "balanced";
+    case workflow::Balance::by_sensor:
+      return "by_sensor";
+    case workflow::Balance::by_cell:
+      return "by_cell";
+    case workflow::Balance::undecided:
+      return "undecided";
+  }
+  return "";
 }
 
 Json finding_json(const SensorFinding& f) {
@@ -107,9 +165,11 @@ std::string json_of(const AmmeterOptions& o, const measurement::Recording& recor
   for (const measurement::Warning& w : recording.warnings) warnings.push_back(w.id + ": " + w.text);
   const workflow::AmmeterCorrection c = workflow::correction_of(a);
   return Json{{"command", "ammeter"},
-              {"statement", statement_of(a)},
+              {"statement", statement_of(o, a)},
               {"by", a.by_reference ? "reference" : "cell"},
               {"offset_a", finding_json(a.offset_a)},
+              {"balance_a", finding_json(a.balance_a)},
+              {"balance", name_of(workflow::balance_of(a))},
               {"gain", finding_json(a.gain)},
               {"dead_band_a", finding_json(a.dead_band_a)},
               {"clipping_a", finding_json(a.clipping_a)},
@@ -123,15 +183,17 @@ std::string json_of(const AmmeterOptions& o, const measurement::Recording& recor
 }
 
 std::vector<std::pair<std::string, std::string>> findings_of(const Ammeter& a) {
-  return {{"offset", offset_text(a.offset_a)},
-          {"gain", gain_text(a.gain)},
-          {"dead band", dead_band_text(a.dead_band_a)},
-          {"clipping", clipping_text(a.clipping_a)}};
+  std::vector<std::pair<std::string, std::string>> found = {{"offset", offset_text(a.offset_a)},
+                                                            {"gain", gain_text(a.gain)},
+                                                            {"dead band", dead_band_text(a.dead_band_a)},
+                                                            {"clipping", clipping_text(a.clipping_a)}};
+  if (!a.by_reference) found.insert(found.begin(), {"charge", balance_text(a.balance_a)});
+  return found;
 }
 
 std::string report_of(const AmmeterOptions& o, const measurement::Recording& recording, const Ammeter& a) {
   files::PageContent page{
-      "Current sensor of " + recording.path.substr(recording.path.rfind('/') + 1), statement_of(a), {}, {}, {}};
+      "Current sensor of " + recording.path.substr(recording.path.rfind('/') + 1), statement_of(o, a), {}, {}, {}};
   const auto table = [&](const char* id, const char* title, const char* first, const char* second, const auto& lines,
                          const char* note) {
     files::PageTable t{id, title, {first, second}, {}, note};
@@ -161,6 +223,10 @@ class AmmeterCommand final : public Command {
                  "trusted meter")
         ->required();
     c.add_option("--cell", o_.cell, cell_help())->capture_default_str();
+    c.add_option("--open-contactors", o_.open_contactors,
+                 "log of the same sensor while no current can flow: it distinguishes an offset of the sensor from a "
+                 "leakage of the cell")
+        ->type_name("FILE");
     c.add_option("--capacity-sigma", o_.capacity_sigma,
                  "standard deviation of the capacity in the cell file, as a fraction, if another instrument than the "
                  "log's measured it; without it the gain is not visible")
@@ -178,14 +244,17 @@ class AmmeterCommand final : public Command {
 
   int run() override {
     complete_reading(o_.reading);
-    o_.output.protect({o_.recording, o_.cell});
+    o_.output.protect({o_.recording, o_.cell, o_.open_contactors});
     const files::CellFile cell = files::read_cell(o_.cell);
     measurement::Recording recording = files::read_recording(o_.recording, files::VoltageColumn::required, o_.reading);
     print_read_as(o_.output, recording);
     measurement::compare_with_cell(recording, cell.parameters);
     refuse_contradiction(recording);
     for (const measurement::Warning& w : recording.warnings) warn(o_.recording + ": " + w.text);
-    const Ammeter ammeter = workflow::examine_ammeter(recording, cell, o_.capacity_sigma);
+    std::optional<measurement::Recording> open;
+    if (!o_.open_contactors.empty())
+      open = files::read_recording(o_.open_contactors, files::VoltageColumn::optional, o_.reading);
+    const Ammeter ammeter = workflow::examine_ammeter(recording, cell, o_.capacity_sigma, open ? &*open : nullptr);
     if (!o_.output.json.empty()) write_output(o_.output.json, json_of(o_, recording, ammeter));
     if (!o_.output.report.empty()) write_output(o_.output.report, report_of(o_, recording, ammeter));
     print(ammeter);
@@ -194,7 +263,7 @@ class AmmeterCommand final : public Command {
 
  private:
   void print(const Ammeter& ammeter) const {
-    print_summary(o_.output, statement_of(ammeter));
+    print_summary(o_.output, statement_of(o_, ammeter));
     for (const auto& [name, text] : findings_of(ammeter))
       print_summary(o_.output, fmt::format("  {:<10} {}", name, text));
     for (const auto& [where, what] : corrections_of(o_, ammeter))

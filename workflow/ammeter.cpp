@@ -23,6 +23,7 @@ constexpr double high_reading = 0.8;     ///< of the largest: readings to compar
 constexpr double significant = 3;        ///< standard deviations, for a claim that something is there
 constexpr double nothing_beyond = 0.05;  ///< of the largest: if less than that would show, there is no clipping
 constexpr double correlated_s = 60;      ///< errors of a meter are taken as correlated for so long
+constexpr double corrected_sigmas = 2;   ///< standard deviations from which an error is corrected
 constexpr double steps_of_a_gap = 5;     ///< a gap around zero of fewer steps of the reading is its resolution
 
 bool known(double a) { return std::isfinite(a); }
@@ -232,8 +233,8 @@ std::vector<double> beyond_by_voltage(const AmmeterByCell& found, double r0_ohm)
 
 void gain_by_cell(const AmmeterByCell& found, const std::optional<double>& capacity_sigma, Ammeter& ammeter) {
   const Uncertain& g = found.gain_and_capacity;
-  if (!ammeter.offset_a.value)
-    ammeter.gain.why = ammeter.offset_a.why;
+  if (!found.offset_a.value)
+    ammeter.gain.why = found.offset_a.why;
   else if (!found.gain_visible)
     ammeter.gain.why =
         fmt::format("only to {:.1f} %; a log between rests near full and near empty would show it", 100 * g.std);
@@ -248,21 +249,36 @@ void gain_by_cell(const AmmeterByCell& found, const std::optional<double>& capac
     ammeter.gain.value = {g.value, std::hypot(g.std, *capacity_sigma)};
 }
 
-/// Without an answer by the charge: what the sensor reads at rest.
+/// What the sensor reads at the rests of the log.
 void offset_at_rest(const measurement::Recording& recording, const files::CellFile& cell, Ammeter& ammeter) {
   SensorFinding at_rest = reading_at_rest(recording, cell);
   if (at_rest.value && !ammeter.dead_band_a.value)
     ammeter.offset_a = std::move(at_rest);
   else if (at_rest.value)
-    ammeter.offset_a.why += "; at rest a dead band may hide it";
+    ammeter.offset_a.why = "at rest a dead band may hide it";
   else
-    ammeter.offset_a.why += "; " + at_rest.why;
+    ammeter.offset_a.why = std::move(at_rest.why);
+  if (!ammeter.offset_a.value && !ammeter.balance_a.value)
+    ammeter.offset_a.why = ammeter.balance_a.why + "; " + ammeter.offset_a.why;
+}
+
+/// The charge balance is missing if charge is missing in the count.
+void without_lost_charge(Ammeter& ammeter) {
+  const double known_to_a = ammeter.balance_a.value ? ammeter.balance_a.value->std : 0;
+  if (ammeter.clipping_a.value) {
+    ammeter.balance_a = {{},
+                         "not visible here: the readings are clipped, and the charge beyond is missing in the count"};
+    ammeter.gain = ammeter.balance_a;
+  } else if (ammeter.dead_band_a.value && ammeter.dead_band_a.value->value > known_to_a) {
+    ammeter.balance_a = {{}, "not visible here: the charge of currents in the dead band may be missing in the count"};
+    ammeter.gain = ammeter.balance_a;
+  }
 }
 
 }  // namespace
 
 Ammeter examine_ammeter(const measurement::Recording& recording, const files::CellFile& cell,
-                        const std::optional<double>& capacity_sigma) {
+                        const std::optional<double>& capacity_sigma, const measurement::Recording* open_contactors) {
   Ammeter ammeter;
   const Readings all = readings_of(recording);
   if (all.sizes.size() < fewest_readings)
@@ -277,23 +293,34 @@ Ammeter examine_ammeter(const measurement::Recording& recording, const files::Ce
   }
   const AmmeterByCell found = ammeter_by_cell(recording, cell);
   ammeter.residual_v = found.residual_v;
-  ammeter.offset_a = found.offset_a;
+  ammeter.balance_a = found.offset_a;
   gain_by_cell(found, capacity_sigma, ammeter);
   if (found.error_v.empty())
     ammeter.clipping_a.why = found.offset_a.why;
   else
     find_clipping(recording, all, beyond_by_voltage(found, mean_r0_ohm(found, cell)), ammeter);
-  const double known_to_a = ammeter.offset_a.value ? ammeter.offset_a.value->std : 0;
-  if (ammeter.clipping_a.value) {
-    ammeter.offset_a = {{},
-                        "not visible here: the readings are clipped, and the charge beyond is missing in the count"};
-    ammeter.gain = ammeter.offset_a;
-  } else if (ammeter.dead_band_a.value && ammeter.dead_band_a.value->value > known_to_a) {
-    ammeter.offset_a = {{}, "not visible here: the charge of currents in the dead band may be missing in the count"};
-    ammeter.gain = ammeter.offset_a;
+  without_lost_charge(ammeter);
+  if (open_contactors == nullptr) {
+    offset_at_rest(recording, cell, ammeter);
+  } else {
+    ammeter.offset_a = reading_without_current(*open_contactors);
+    ammeter.open_contactors = ammeter.offset_a.value.has_value();
   }
-  if (!ammeter.offset_a.value) offset_at_rest(recording, cell, ammeter);
   return ammeter;
+}
+
+Balance balance_of(const Ammeter& ammeter) {
+  const auto& balance = ammeter.balance_a.value;
+  const auto& offset = ammeter.offset_a.value;
+  if (!balance) return Balance::missing;
+  if (std::abs(balance->value) <= corrected_sigmas * balance->std) return Balance::balanced;
+  if (!offset) return Balance::undecided;
+  const double apart_a = std::abs(balance->value - offset->value);
+  const bool alike = apart_a <= corrected_sigmas * std::hypot(balance->std, offset->std);
+  if (alike) return std::abs(offset->value) > corrected_sigmas * offset->std ? Balance::by_sensor : Balance::undecided;
+  // a load at rest is read as well, so a reading at rest that is not zero shows nothing about the cell
+  const bool zero = std::abs(offset->value) <= corrected_sigmas * offset->std;
+  return ammeter.open_contactors || zero ? Balance::by_cell : Balance::undecided;
 }
 
 std::string amperes(double a) {
@@ -301,8 +328,11 @@ std::string amperes(double a) {
 }
 
 AmmeterCorrection correction_of(const Ammeter& ammeter) {
+  const Balance balance = balance_of(ammeter);
+  // with open contactors the sensor's own error is known, whatever the cell does
+  if (balance == Balance::undecided || (balance == Balance::by_cell && !ammeter.open_contactors)) return {};
   const auto larger = [](const SensorFinding& f) {
-    return f.value && std::abs(f.value->value) > 2 * f.value->std ? f.value->value : 0;
+    return f.value && std::abs(f.value->value) > corrected_sigmas * f.value->std ? f.value->value : 0;
   };
   const double gain = larger(ammeter.gain), offset_a = larger(ammeter.offset_a);
   return {1 / (1 + gain) - 1, -offset_a / (1 + gain)};

@@ -15,7 +15,21 @@ constexpr double constant_c = 0.005;  ///< readings of a rest are that close to 
 constexpr double noise_sigmas = 4;    ///< or that close in standard deviations of the cell file's noise
 constexpr double shortest_rest_s = 120;
 constexpr double longest_part_s = 600;  ///< a longer rest counts as several, which show the drift of the sensor
-constexpr std::size_t fewest_rows = 5, fewest_rests = 3;
+constexpr std::size_t fewest_rows = 5, fewest_rests = 3, fewest_open_readings = 30;
+
+double mean_of(const std::vector<double>& values) {
+  double sum = 0;
+  for (const double v : values) sum += v;
+  return sum / static_cast<double>(values.size());
+}
+
+/// Standard deviation of one value; 0 of a single one.
+double scatter_of(const std::vector<double>& values) {
+  const double mean = mean_of(values);
+  double squares = 0;
+  for (const double v : values) squares += (v - mean) * (v - mean);
+  return values.size() < 2 ? 0 : std::sqrt(squares / static_cast<double>(values.size() - 1));
+}
 
 struct Rest {
   double mean_a = 0, duration_s = 0;
@@ -76,13 +90,36 @@ SensorFinding reading_at_rest(const measurement::Recording& r, const files::Cell
                             means.front(), means.back());
     return found;
   }
-  double sum = 0, squares = 0;
-  for (const double a : means) sum += a;
-  const auto count = static_cast<double>(means.size());
-  for (const double a : means) squares += (a - sum / count) * (a - sum / count);
-  const double drift_a = std::sqrt(squares / (count - 1));  // of the sensor between rests: it does not average out
-  found.value = {sum / count, std::max(drift_a, cell.parameters.noise.current_a)};
+  const double drift_a = scatter_of(means);  // of the sensor between rests: it does not average out
+  found.value = {mean_of(means), std::max(drift_a, cell.parameters.noise.current_a)};
   found.why = fmt::format("if no current flows during the {:.0f} minutes of rest in the log", minutes);
+  return found;
+}
+
+SensorFinding reading_without_current(const measurement::Recording& r) {
+  SensorFinding found;
+  std::vector<double> readings, minutes;
+  for (std::size_t k = 0; k < r.rows();) {
+    double sum_a = 0;
+    std::size_t count = 0;
+    const double from_s = r.time_s[k];
+    for (; k < r.rows() && r.time_s[k] - from_s < 60; ++k) {
+      if (!std::isfinite(r.current_a[k])) continue;
+      sum_a += r.current_a[k];
+      ++count;
+      readings.push_back(r.current_a[k]);
+    }
+    if (count > 0) minutes.push_back(sum_a / static_cast<double>(count));
+  }
+  if (readings.size() < fewest_open_readings) {
+    found.why = fmt::format("fewer than {} readings with open contactors", fewest_open_readings);
+  } else if (std::all_of(readings.begin(), readings.end(), [](double a) { return a == 0; })) {
+    found.why = "with open contactors it reads exactly 0, which is right or written by the device";
+  } else {
+    // what drifts between minutes does not average out
+    found.value = {mean_of(readings), std::max(scatter_of(minutes),
+                                               scatter_of(readings) / std::sqrt(static_cast<double>(readings.size())))};
+  }
   return found;
 }
 

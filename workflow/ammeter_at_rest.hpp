@@ -12,4 +12,9 @@ namespace bms::workflow {
 /// the reading is exactly 0, which a device may write by itself.
 SensorFinding reading_at_rest(const measurement::Recording& recording, const files::CellFile& cell);
 
+/// The mean reading of a recording during which no current can flow. No answer if it has fewer than 30 readings, or if
+/// all of them are exactly 0, which a device may write by itself. The standard deviation includes the drift between
+/// minutes.
+SensorFinding reading_without_current(const measurement::Recording& recording);
+
 }  // namespace bms::workflow

@@ -10,7 +10,7 @@
 namespace bms::workflow {
 
 struct AmmeterByCell {
-  SensorFinding offset_a;
+  SensorFinding offset_a;       ///< of the charge balance: the sensor's, if the cell loses no charge
   Uncertain gain_and_capacity;  ///< gain that the charge balance shows if the capacity is exact
   bool gain_visible = false;    ///< the log says more about it than what was assumed
   double residual_v = 0;        ///< RMS

@@ -54,8 +54,8 @@ TEST(Ammeter, TheOffsetIsFoundWithinItsUncertainty) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     for (const double offset_a : {-0.25, 0.0, 0.08}) {
       const Ammeter a = examine_ammeter(shift({.offset_a = offset_a}, seed), table9(), {});
-      ASSERT_TRUE(a.offset_a.value) << a.offset_a.why;
-      const double error_a = a.offset_a.value->value - offset_a, std_a = a.offset_a.value->std;
+      ASSERT_TRUE(a.balance_a.value) << a.balance_a.why;
+      const double error_a = a.balance_a.value->value - offset_a, std_a = a.balance_a.value->std;
       EXPECT_LT(std_a, 0.04) << "of use: less than one hundredth of 1C";
       EXPECT_LT(std::abs(error_a), 3 * std::hypot(std_a, 0.015)) << offset_a << ", seed " << seed;
       squares += error_a * error_a / (std_a * std_a);
@@ -83,8 +83,8 @@ TEST(Ammeter, AnotherCellIsNotAnOffset) {
   auto log = shift({}, 1);
   for (double& v : log.voltage_v.edit()) v += 0.06;
   const Ammeter a = examine_ammeter(log, table9(), {});
-  EXPECT_FALSE(a.offset_a.value) << a.residual_v.value_or(0);
-  EXPECT_THAT(a.offset_a.why, HasSubstr("does not describe this log"));
+  EXPECT_FALSE(a.balance_a.value) << a.residual_v.value_or(0);
+  EXPECT_THAT(a.balance_a.why, HasSubstr("does not describe this log"));
 }
 
 TEST(Ammeter, ClippingIsFoundByTheVoltage) {
@@ -94,7 +94,7 @@ TEST(Ammeter, ClippingIsFoundByTheVoltage) {
   ASSERT_TRUE(clipped.clipping_a.value) << clipped.clipping_a.why;
   EXPECT_NEAR(clipped.clipping_a.value->value, -0.6 * largest_a, 0.01 * largest_a);
   EXPECT_LT(clipped.missed_a, 0) << "more discharge than read";
-  EXPECT_FALSE(clipped.offset_a.value) << "the charge beyond is missing";
+  EXPECT_FALSE(clipped.balance_a.value) << "the charge beyond is missing";
   EXPECT_FALSE(examine_ammeter(clean, table9(), {}).clipping_a.value);
 }
 
@@ -151,6 +151,80 @@ TEST(Ammeter, RestsThatDifferAreLoadsAndExactZerosProveNothing) {
   const Ammeter zero = examine_ammeter(zeros, table9(), {});
   EXPECT_FALSE(zero.offset_a.value);
   EXPECT_THAT(zero.offset_a.why, HasSubstr("exactly 0"));
+}
+
+/// Of a cell that loses leak_a: what the sensor reads, and the voltage of the cell at the current less the leakage.
+measurement::Recording leaking_shift(double leak_a) {
+  plant::Cell cell({.capacity_ah = 6}, {.soc = 0.97, .v_rc_v = 0, .temperature_c = 20});
+  plant::Instruments instruments({}, 3);
+  auto profile = experiments::experiment("forklift_shift", {.capacity_ah = 6, .seed = 3, .step_s = 10}).value();
+  for (experiments::ProfileRow& row : profile) row.current_a -= leak_a;
+  measurement::Recording r;
+  for (const plant::RecordedRow& row : plant::record(profile, cell, instruments, {.start_c = 20, .end_c = 20})) {
+    r.time_s.edit().push_back(row.time_s);
+    r.current_a.edit().push_back(row.current_a + leak_a);
+    r.voltage_v.edit().push_back(row.voltage_v);
+    r.temperature_c.edit().push_back(row.temperature_c);
+  }
+  return r;
+}
+
+/// Ten minutes of a sensor while no current flows.
+measurement::Recording open_contactors(double offset_a) {
+  measurement::Recording r;
+  for (int k = 0; k < 600; ++k) {
+    r.time_s.edit().push_back(k);
+    r.current_a.edit().push_back(offset_a + 0.002 * (k % 3 - 1));
+  }
+  return r;
+}
+
+TEST(Ammeter, ALeakageOfTheCellIsNotCorrectedAtTheSensor) {
+  const auto log = leaking_shift(0.3);
+  const Ammeter alone = examine_ammeter(log, table9(), {});
+  ASSERT_TRUE(alone.balance_a.value) << alone.balance_a.why;
+  EXPECT_NEAR(alone.balance_a.value->value, 0.3, 3 * std::hypot(alone.balance_a.value->std, 0.015));
+  EXPECT_NE(balance_of(alone), Balance::by_sensor);
+  EXPECT_TRUE(correction_of(alone).empty()) << "it would hide the leakage";
+  const auto open = open_contactors(0.01);
+  const Ammeter with_open = examine_ammeter(log, table9(), {}, &open);
+  EXPECT_EQ(balance_of(with_open), Balance::by_cell);
+  EXPECT_NEAR(correction_of(with_open).offset_a, -0.01, 1e-3) << "its own offset only";
+}
+
+TEST(Ammeter, AnOffsetIsCorrectedOnceTheSensorIsReadWithoutCurrent) {
+  const auto open = open_contactors(0.3);
+  const Ammeter a = examine_ammeter(shift({.offset_a = 0.3}, 3), table9(), {}, &open);
+  EXPECT_EQ(balance_of(a), Balance::by_sensor) << a.balance_a.why;
+  EXPECT_NEAR(correction_of(a).offset_a, -0.3, 1e-3);
+  EXPECT_TRUE(a.open_contactors);
+  const auto zeros = open_contactors(0);
+  auto exact = zeros;
+  for (double& reading : exact.current_a.edit()) reading = 0;
+  const Ammeter written = examine_ammeter(shift({.offset_a = 0.3}, 3), table9(), {}, &exact);
+  EXPECT_EQ(balance_of(written), Balance::undecided) << "a device may write zeros by itself";
+  EXPECT_TRUE(correction_of(written).empty());
+}
+
+TEST(Ammeter, ABalanceAloneCorrectsNothing) {
+  Ammeter a;
+  for (const double balance_a : {0.3, -0.3}) {
+    a.balance_a.value = Uncertain{balance_a, 0.05};
+    a.offset_a.value.reset();
+    EXPECT_EQ(balance_of(a), Balance::undecided);
+    EXPECT_TRUE(correction_of(a).empty());
+    a.offset_a.value = Uncertain{balance_a, 0.01};
+    EXPECT_EQ(balance_of(a), Balance::by_sensor);
+    EXPECT_NEAR(correction_of(a).offset_a, -balance_a, 1e-12);
+    a.offset_a.value = Uncertain{0.001, 0.01};
+    EXPECT_EQ(balance_of(a), Balance::by_cell);
+    EXPECT_TRUE(correction_of(a).empty());
+    a.offset_a.value = Uncertain{-balance_a, 0.01};
+    EXPECT_EQ(balance_of(a), Balance::undecided) << "a load is connected at rest, or both have errors";
+    EXPECT_TRUE(correction_of(a).empty());
+  }
+  a.balance_a.value = Uncertain{0.05, 0.05};
+  EXPECT_EQ(balance_of(a), Balance::balanced);
 }
 
 /// Ten minutes of slow triangles from -20 to 20 A with a trusted meter.
@@ -210,13 +284,13 @@ TEST(Ammeter, ADeadBandBelowTheUncertaintyLeavesTheOffset) {
   }
   const Ammeter a = examine_ammeter(fine, table9(), {});
   ASSERT_TRUE(a.dead_band_a.value) << a.dead_band_a.why;
-  ASSERT_TRUE(a.offset_a.value) << a.offset_a.why;
-  EXPECT_GT(a.offset_a.value->std, a.dead_band_a.value->value);
-  EXPECT_NEAR(a.offset_a.value->value, 0, 3 * std::hypot(a.offset_a.value->std, 0.015));
+  ASSERT_TRUE(a.balance_a.value) << a.balance_a.why;
+  EXPECT_GT(a.balance_a.value->std, a.dead_band_a.value->value);
+  EXPECT_NEAR(a.balance_a.value->value, 0, 3 * std::hypot(a.balance_a.value->std, 0.015));
   const Ammeter wide = examine_ammeter(shift({.dead_band_a = 0.5}, 2, 6, 1), table9(), {});
   ASSERT_TRUE(wide.dead_band_a.value) << wide.dead_band_a.why;
-  EXPECT_FALSE(wide.offset_a.value);
-  EXPECT_THAT(wide.offset_a.why, HasSubstr("the charge of currents in the dead band may be missing in the count"));
+  EXPECT_FALSE(wide.balance_a.value);
+  EXPECT_THAT(wide.balance_a.why, HasSubstr("the charge of currents in the dead band may be missing in the count"));
 }
 
 }  // namespace

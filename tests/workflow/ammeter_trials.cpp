@@ -129,10 +129,11 @@ Tables tables_of(const std::vector<std::string>& names, bool print) {
       const Ammeter a = workflow::examine_ammeter(with(clean, p, capacity_ah), cell, {});
       const bool clipped = p.largest_share < 1;
       const bool banded = p.dead_band_share > 0;
-      const std::string row = fmt::format("| {} | {} ({}) | {} | {} | {} | {} |\n", name, c.cell, c.remark, p.name,
-                                          judge(a.offset_a, p.offset_c * capacity_ah, offsets[k]),
-                                          mark(a.clipping_a, clipped, clipping[clipped ? 1 : 0]),
-                                          mark(a.dead_band_a, banded, dead_band[banded ? 1 : 0]));
+      const std::string row =
+          fmt::format("| {} | {} ({}) | {} | {} | {} | {} |\n", name, c.cell, c.remark, p.name,
+                      judge(a.balance_a.value ? a.balance_a : a.offset_a, p.offset_c * capacity_ah, offsets[k]),
+                      mark(a.clipping_a, clipped, clipping[clipped ? 1 : 0]),
+                      mark(a.dead_band_a, banded, dead_band[banded ? 1 : 0]));
       out.offsets += row;
       if (print) fmt::print("{}", row);
       std::fflush(stdout);
