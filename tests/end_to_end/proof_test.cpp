@@ -35,7 +35,7 @@ class ProofTool : public ::testing::Test {
     std::ofstream out(path("data/" + name + ".csv"));
     std::string line;
     std::getline(rows, line);
-    out << "time_s,current_a,voltage_v,soc_ref,temperature_c\n";
+    out << "time_s,current_a,voltage_v,soc,soc_ref,temperature_c\n";
     while (std::getline(rows, line)) out << line << "," << temperature_c << "\n";
   }
   static std::string slow(double current_a) {
