@@ -38,9 +38,10 @@ std::string offset_text(const SensorFinding& f) {
                      f.value->value < 0 ? "low" : "high", f.why.empty() ? "" : ", " + f.why);
 }
 
-std::string balance_text(const SensorFinding& f) {
+std::string balance_text(const Ammeter& a) {
+  const SensorFinding& f = a.balance_a;
   if (!f.value) return f.why;
-  if (std::abs(f.value->value) <= 2 * f.value->std)
+  if (workflow::balance_of(a) == workflow::Balance::balanced)
     return fmt::format("balanced to {} +- {}", amperes(f.value->value), amperes(f.value->std));
   return fmt::format("{} by {} +- {}", f.value->value > 0 ? "short" : "over", amperes(std::abs(f.value->value)),
                      amperes(f.value->std));
@@ -104,9 +105,8 @@ std::string cell_causes(const Ammeter& a) {
 
 /// Of a balance that is off, and no reading without current that explains it.
 std::string undecided_text(const Ammeter& a, const std::string& recording) {
-  std::string text =
-      fmt::format("The charge balance is {}: the sensor reads that much too {}, or {}.", balance_text(a.balance_a),
-                  a.balance_a.value->value > 0 ? "high" : "low", cell_causes(a));
+  std::string text = fmt::format("The charge balance is {}: the sensor reads that much too {}, or {}.", balance_text(a),
+                                 a.balance_a.value->value > 0 ? "high" : "low", cell_causes(a));
   if (a.offset_a.value) text += fmt::format(" At rest the sensor {}.", offset_text(a.offset_a));
   return text + fmt::format(
                     " Before anything is corrected, record the sensor for ten minutes with the contactors open, then: "
@@ -122,11 +122,9 @@ std::string statement_of(const AmmeterOptions& o, const Ammeter& a) {
     return fmt::format(
         "The charge balance is {}, but with {} the sensor {}. So {}. Do not correct the sensor for it; "
         "bms diagnose names the cause.",
-        balance_text(a.balance_a), a.open_contactors ? "open contactors" : "no load", offset_text(a.offset_a),
-        cell_causes(a));
+        balance_text(a), a.open_contactors ? "open contactors" : "no load", offset_text(a.offset_a), cell_causes(a));
   if (!a.offset_a.value) {
-    if (balance == workflow::Balance::balanced)
-      return fmt::format("The charge is {}: no correction.", balance_text(a.balance_a));
+    if (balance == workflow::Balance::balanced) return fmt::format("The charge is {}: no correction.", balance_text(a));
     return "This log does not show the offset of the current sensor: " + a.offset_a.why + ".";
   }
   std::string text = fmt::format("The current sensor {}", offset_text(a.offset_a));
@@ -187,7 +185,7 @@ std::vector<std::pair<std::string, std::string>> findings_of(const Ammeter& a) {
                                                             {"gain", gain_text(a.gain)},
                                                             {"dead band", dead_band_text(a.dead_band_a)},
                                                             {"clipping", clipping_text(a.clipping_a)}};
-  if (!a.by_reference) found.insert(found.begin(), {"charge", balance_text(a.balance_a)});
+  if (!a.by_reference) found.insert(found.begin(), {"charge", balance_text(a)});
   return found;
 }
 

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "measurement/statistics.hpp"
+
 namespace bms::workflow {
 
 namespace {
@@ -17,15 +19,9 @@ constexpr double shortest_rest_s = 120;
 constexpr double longest_part_s = 600;  ///< a longer rest counts as several, which show the drift of the sensor
 constexpr std::size_t fewest_rows = 5, fewest_rests = 3, fewest_open_readings = 30;
 
-double mean_of(const std::vector<double>& values) {
-  double sum = 0;
-  for (const double v : values) sum += v;
-  return sum / static_cast<double>(values.size());
-}
-
 /// Standard deviation of one value; 0 of a single one.
 double scatter_of(const std::vector<double>& values) {
-  const double mean = mean_of(values);
+  const double mean = measurement::mean(values);
   double squares = 0;
   for (const double v : values) squares += (v - mean) * (v - mean);
   return values.size() < 2 ? 0 : std::sqrt(squares / static_cast<double>(values.size() - 1));
@@ -91,7 +87,7 @@ SensorFinding reading_at_rest(const measurement::Recording& r, const files::Cell
     return found;
   }
   const double drift_a = scatter_of(means);  // of the sensor between rests: it does not average out
-  found.value = {mean_of(means), std::max(drift_a, cell.parameters.noise.current_a)};
+  found.value = {measurement::mean(means), std::max(drift_a, cell.parameters.noise.current_a)};
   found.why = fmt::format("if no current flows during the {:.0f} minutes of rest in the log", minutes);
   return found;
 }
@@ -117,8 +113,9 @@ SensorFinding reading_without_current(const measurement::Recording& r) {
     found.why = "with open contactors it reads exactly 0, which is right or written by the device";
   } else {
     // what drifts between minutes does not average out
-    found.value = {mean_of(readings), std::max(scatter_of(minutes),
-                                               scatter_of(readings) / std::sqrt(static_cast<double>(readings.size())))};
+    found.value = {
+        measurement::mean(readings),
+        std::max(scatter_of(minutes), scatter_of(readings) / std::sqrt(static_cast<double>(readings.size())))};
   }
   return found;
 }

@@ -37,9 +37,8 @@ void add_contradiction(const DiagnoseOptions& options, DiagnoseResult& r) {
   if (worst == nullptr) return;
   r.together = together_command(options, r.recordings, r.holdouts);
   std::string& statement = r.diagnosis.statement;
-  constexpr std::string_view nothing_to_do = diagnosis::no_action;
-  if (verdict == diagnosis::Verdict::no_mismatch && statement.ends_with(nothing_to_do)) {
-    statement.resize(statement.size() - nothing_to_do.size());
+  if (verdict == diagnosis::Verdict::no_mismatch && statement.ends_with(diagnosis::no_action)) {
+    statement.resize(statement.size() - diagnosis::no_action.size());
     statement += "No action is needed for this recording.";
   }
   statement += fmt::format(" But the prediction of the hold-out {} is off by {}: {} Diagnose both together.",

@@ -69,7 +69,7 @@ class FrameLog {
       by_samples_ = options.map.empty();
     }
     dbc_name_ = own_ ? own_dbc_name : options.dbc;
-    dbc_ = own_ ? parse_dbc(own_dbc, own_dbc_name) : read_dbc(options.dbc);
+    dbc_ = own_ ? own_signals() : read_dbc(options.dbc);
     for (const std::string& text : mapped) map(text);
     if (index_of(Quantity::current) == signals_.size())
       throw BadInput("--map", 1, "no signal for current_a, expected --map current_a=SIGNAL with a signal of the DBC");

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <span>
 
 #include <fmt/format.h>
@@ -17,6 +16,14 @@ namespace {
 
 constexpr std::size_t foreign_frames = 100'000;  ///< without one of its own: not a log of the battery
 
+/// Identifier of a message; 0 if the file does not have it.
+std::uint32_t id_of(std::string_view message) {
+  for (const DbcSignal& s : own_signals()) {
+    if (s.message == message) return s.id;
+  }
+  return 0;
+}
+
 /// A signal that can fill a column.
 struct Candidate {
   std::string column;
@@ -26,7 +33,7 @@ struct Candidate {
 
 class OwnLog {
  public:
-  OwnLog() : dbc_(parse_dbc(own_dbc, own_dbc_name)) {
+  OwnLog() {
     add("current_a", "SampleCurrent", "CurrentUa");  // the reading itself, unless it was switched off
     add("current_a", "PackElectrical", "Current");
     add("voltage_v", "SampleVoltage", "VoltageUv");
@@ -34,20 +41,18 @@ class OwnLog {
     add("temperature_c", "PackElectrical", "Temperature");
     add("pack_voltage_v", "PackVoltage", "Voltage");
     add("pack_voltage_v", "PackElectrical", "Voltage");
-    for (const DbcSignal& s : dbc_) {
+    for (const DbcSignal& s : own_signals()) {
       if (s.message.starts_with("CellVoltages") && s.name.starts_with("Cell"))
         candidates_.push_back({"v_" + s.name.substr(4), s});
       if (s.message == "Temperatures" && s.name.starts_with("Temperature"))
         candidates_.push_back({"t_" + s.name.substr(11), s});
     }
-    const auto identity =
-        std::find_if(dbc_.begin(), dbc_.end(), [](const DbcSignal& s) { return s.message == "Identity"; });
-    if (identity != dbc_.end()) identity_ = identity->id;
   }
 
   void receive(const TextFrame& frame) {
     if (!is_own_frame(frame)) return;
-    identified_ = identified_ || frame.id == identity_;
+    static const std::uint32_t identity = id_of("Identity");
+    identified_ = identified_ || frame.id == identity;
     for (Candidate& c : candidates_) {
       if (!c.seen && c.signal.id == frame.id)
         c.seen = !is_missing(c.signal, std::span(frame.data.data(), frame.length));
@@ -71,7 +76,7 @@ class OwnLog {
 
  private:
   void add(const char* column, std::string_view message, std::string_view name) {
-    for (const DbcSignal& s : dbc_) {
+    for (const DbcSignal& s : own_signals()) {
       if (s.message == message && s.name == name) candidates_.push_back({column, s});
     }
   }
@@ -80,13 +85,16 @@ class OwnLog {
                        [&](const Candidate& c) { return c.seen && c.column.starts_with(prefix); });
   }
 
-  std::vector<DbcSignal> dbc_;
   std::vector<Candidate> candidates_;
-  std::uint32_t identity_ = 0;
   bool identified_ = false;
 };
 
 }  // namespace
+
+const std::vector<DbcSignal>& own_signals() {
+  static const std::vector<DbcSignal> signals = parse_dbc(own_dbc, own_dbc_name);
+  return signals;
+}
 
 bool is_own_frame(const TextFrame& frame) {
   if (frame.long_id || frame.length != 8) return false;
@@ -98,12 +106,7 @@ bool is_own_frame(const TextFrame& frame) {
 }
 
 bool ends_a_sample(const TextFrame& frame) {
-  static const std::uint32_t status = [] {
-    for (const DbcSignal& s : parse_dbc(own_dbc, own_dbc_name)) {
-      if (s.message == "Status") return s.id;
-    }
-    return std::uint32_t{0};
-  }();
+  static const std::uint32_t status = id_of("Status");
   return frame.id == status;
 }
 

@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "files/logs/dbc.hpp"
 #include "files/logs/frame_text.hpp"
 
 namespace bms::files {
@@ -12,6 +13,9 @@ namespace bms::files {
 /// The text of can/greybox_bms.dbc.
 extern const std::string_view own_dbc;
 inline constexpr const char* own_dbc_name = "the battery's own messages";
+
+/// Its signals.
+const std::vector<DbcSignal>& own_signals();
 
 /// Returns true if the frame has an identifier of 11 bits, eight bytes, and the check code that the battery's own
 /// message of this identifier has.
