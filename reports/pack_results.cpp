@@ -117,6 +117,7 @@ files::PageTable limit_table(const dp::PackDiagnosis& d) {
     table.rows.push_back(
         {files::text_cell(text.substr(0, text.find(' '))), files::text_cell(text.substr(text.find(' ') + 1))});
   }
+  if (!d.not_visible.empty()) table.note = "Not visible in this recording: " + dp::causes_text(d.not_visible) + ".";
   return table;
 }
 
@@ -176,6 +177,8 @@ std::string json_of(const workflow::PackResult& r) {
                       {"parameter", dp::text_of(l.cause).parameter},
                       {"value", number(l.value)},
                       {"unit", dp::text_of(l.cause).unit}});
+  Json not_visible = Json::array();
+  for (const dp::Cause c : d.not_visible) not_visible.push_back(dp::text_of(c).id);
   for (const dp::UnexplainedCell& u : d.unexplained)
     unexplained.push_back({{"cell", u.cell + 1}, {"rms_v", number(u.rms_v)}, {"usual_v", number(u.usual_v)}});
   for (const std::size_t c : d.reference) reference.push_back(c + 1);
@@ -194,6 +197,7 @@ std::string json_of(const workflow::PackResult& r) {
                   {"pack_ohm_per_cell", optional(d.channels.pack_ohm)},
                   {"isolability", isolability_of(d.isolability)},
                   {"detection_limits", std::move(limits)},
+                  {"not_visible", std::move(not_visible)},
                   {"reference_cells", std::move(reference)},
                   {"noise_floor_v", number(d.noise_v)},
                   {"wall_s", r.wall_s},

@@ -113,10 +113,7 @@ std::string pack_summary(const workflow::PackResult& r) {
   }
   if (text.back() != '\n') text += '\n';
   if (!r.diagnosis.findings.empty() && !r.diagnosis.unexplained.empty()) text += r.diagnosis.statement + '\n';
-  std::string limits;
-  for (const dp::PackLimit& l : r.diagnosis.detection_limits)
-    limits += (limits.empty() ? "" : ", ") + dp::limit_text(l);
-  return text + "All cells together: " + r.shared + "\nSmallest sizes that would be named: " + limits + ".";
+  return text + "All cells together: " + r.shared + "\n" + dp::limits_text(r.diagnosis);
 }
 
 class DiagnoseCommand final : public Command {

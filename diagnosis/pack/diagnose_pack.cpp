@@ -372,6 +372,7 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   const Matrix& information = s.fits[typical_cell(s)].all().of_parameters;
   d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm);
   d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood);
+  d.not_visible = without_limit(d.detection_limits);
   d.reference = reference_of(s);
   d.channels = s.channels;
   return d;

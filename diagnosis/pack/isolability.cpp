@@ -3,10 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <string_view>
 
 #include <Eigen/Cholesky>
 
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "model/catalogue.hpp"
 
 namespace bms::diagnosis::pack {
 
@@ -112,6 +114,30 @@ std::size_t pairs_in(const std::vector<std::vector<bool>>& table) {
   return count;
 }
 
+/// The largest size that a cause can have: all of the charge, or the bound of the same parameter in the catalogue.
+double largest_size(Cause cause, double r0_ohm) {
+  const auto bound = [](std::string_view id) {
+    return model::catalogue[model::mechanism_index(id)].parameter[0].upper(1);  // of 1 Ah
+  };
+  switch (cause) {
+    case Cause::leakage:
+      return limits.hours_per_day * bound("leakage");
+    case Cause::resistance:
+      return bound("resistance_growth");
+    case Cause::joint:
+      return bound("resistance_growth") * r0_ohm;
+    case Cause::offset:
+    case Cause::sense_wire:
+      return bound("voltage_offset");
+    case Cause::gain:
+      return bound("voltage_gain");
+    case Cause::late:
+      return bound("channel_skew");
+    default:
+      return 1;
+  }
+}
+
 }  // namespace
 
 Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm) {
@@ -142,9 +168,19 @@ std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vect
     const double constant = gain_at(0), of_example = gain_at(example_of(cause, r0_ohm)) - constant;
     if (!(of_example > 0)) continue;
     const double size = example_of(cause, r0_ohm) * std::sqrt((likelihood.least_gain() - constant) / of_example);
-    list.push_back({cause, std::max({least, size, significant_size(d, cause, r0_ohm)})});
+    const double limit = std::max({least, size, significant_size(d, cause, r0_ohm)});
+    if (limit <= largest_size(cause, r0_ohm)) list.push_back({cause, limit});
   }
   return list;
+}
+
+std::vector<Cause> without_limit(const std::vector<PackLimit>& stated) {
+  std::vector<Cause> causes;
+  for (const Cause cause : cell_causes) {
+    if (std::none_of(stated.begin(), stated.end(), [&](const PackLimit& l) { return l.cause == cause; }))
+      causes.push_back(cause);
+  }
+  return causes;
 }
 
 }  // namespace bms::diagnosis::pack

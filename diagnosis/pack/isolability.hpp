@@ -14,8 +14,11 @@ namespace bms::diagnosis::pack {
 Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm);
 
 /// The sizes at which a cause that is alone in this cell would be named: by its gain, its significance, and the size
-/// that is worth a visit. likelihood: of this pack.
+/// that is worth a visit. A size that no cell, connection or channel can have is left out. likelihood: of this pack.
 std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
                                            const PackLikelihood& likelihood);
+
+/// The causes of a cell that are not among these limits.
+std::vector<Cause> without_limit(const std::vector<PackLimit>& limits);
 
 }  // namespace bms::diagnosis::pack

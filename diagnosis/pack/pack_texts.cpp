@@ -193,6 +193,21 @@ std::string limit_text(const PackLimit& l) {
   return fmt::format("{} {}", text_of(l.cause).id, number(l.value, 0, text_of(l.cause).unit));
 }
 
+std::string causes_text(const std::vector<Cause>& causes) {
+  std::string text;
+  for (const Cause c : causes) text += fmt::format("{}{}", text.empty() ? "" : ", ", text_of(c).id);
+  return text;
+}
+
+std::string limits_text(const PackDiagnosis& d) {
+  std::string text;
+  for (const PackLimit& l : d.detection_limits) text += (text.empty() ? "" : ", ") + limit_text(l);
+  if (!text.empty()) text = "Smallest sizes that would be named: " + text + ".";
+  if (!d.not_visible.empty())
+    text += fmt::format("{}Not visible in this recording: {}.", text.empty() ? "" : " ", causes_text(d.not_visible));
+  return text;
+}
+
 std::string cells_text(const std::vector<std::size_t>& cells) {
   if (cells.size() > 2 && cells.back() - cells.front() + 1 == cells.size())
     return fmt::format("{} to {}", cells.front() + 1, cells.back() + 1);

@@ -23,6 +23,10 @@ std::string rivals_text(const PackFinding& finding);
 std::string time_text(const PackFinding& finding);
 /// One of the sizes that would be found: "capacity 5 %".
 std::string limit_text(const PackLimit& limit);
+/// "Smallest sizes that would be named: ... Not visible in this recording: ..."
+std::string limits_text(const PackDiagnosis& d);
+/// The ids of causes, "leakage, capacity_change".
+std::string causes_text(const std::vector<Cause>& causes);
 /// The statement of the whole diagnosis.
 std::string statement_of(const PackDiagnosis& diagnosis);
 /// What confirms that channels are held: the pack's voltmeter.

@@ -64,6 +64,7 @@ struct PackDiagnosis {
   std::string current_sensor;  ///< what the mean of the cells shows of it, or why it was not tested
   Isolability isolability;
   std::vector<PackLimit> detection_limits;
+  std::vector<Cause> not_visible;      ///< causes that no possible size would show in this recording
   std::vector<std::size_t> reference;  ///< cells that served as the neighbours
   double noise_v = 0;                  ///< RMS of the difference between healthy cells, what the model does not explain
   double duration_s = 0;

@@ -3,10 +3,12 @@
 #include <cmath>
 #include <vector>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "diagnosis/pack/channels.hpp"
 #include "diagnosis/pack/isolability.hpp"
+#include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 #include "diagnosis/pack/selection.hpp"
 #include "diagnosis/pack/sensors.hpp"
@@ -156,6 +158,21 @@ TEST(PackLimits, AreWhatIsNamed) {
     }
   }
   EXPECT_EQ(tried, 6);
+}
+
+/// A recording that shows next to nothing: no cell has more than all of its charge, so a limit cannot be larger.
+TEST(PackLimits, ThatNoCellCanHaveAreLeftOut) {
+  const dp::Matrix information = 1e-12 * information_of_a_shift();
+  const dp::Vector healthy = dp::least_spread(r0_ohm);
+  const auto none = cells_with(information, dp::offset, 0);
+  const auto stated = dp::detection_limits_of(information, healthy, r0_ohm, {none, healthy, r0_ohm, 1, 1});
+  for (const dp::PackLimit& l : stated) EXPECT_LE(l.value, l.cause == dp::Cause::late ? 15 : 20) << dp::limit_text(l);
+  dp::PackDiagnosis d;
+  d.detection_limits = stated;
+  d.not_visible = dp::without_limit(stated);
+  EXPECT_EQ(d.not_visible.size() + stated.size(), dp::cell_causes.size());
+  EXPECT_THAT(d.not_visible, testing::Contains(dp::Cause::leakage));
+  EXPECT_THAT(dp::limits_text(d), testing::HasSubstr("Not visible in this recording: "));
 }
 
 }  // namespace
