@@ -208,6 +208,21 @@ void add_extended_cell(const LikelihoodModel& likelihood, const HypothesisFit& b
         d.cell, {best.calibration.data(), best.calibration.data() + best.calibration.size()});
 }
 
+/// A search that was stopped names nothing: what was not tried may explain as much as what was.
+void leave_unfinished(const Search& search, const Scope& scope, Diagnosis& d) {
+  d.interrupted = true;
+  d.verdict = Verdict::unfinished;
+  d.findings.clear();
+  d.withheld.clear();
+  for (const std::size_t m : scope.searched) {
+    const auto has = [m](const auto& fit) {
+      return std::find(fit.first.begin(), fit.first.end(), m) != fit.first.end();
+    };
+    const bool tried = std::any_of(search.best_of_each().begin(), search.best_of_each().end(), has);
+    (tried ? d.tried : d.not_tried).push_back(m);
+  }
+}
+
 void add_resistances_if_understood(LikelihoodModel& likelihood, const HypothesisFit& best, Diagnosis& d) {
   if (!names(d.verdict) && d.verdict != Verdict::no_mismatch) return;
   likelihood.set_noise(best.noise);
@@ -263,9 +278,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   const Errors errors = errors_of(search, likelihood, options.healthy);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
   d.verdict = verdict_of(adequacy, d, contributed, errors);
-  d.interrupted = search.stopped();
-  // that nothing was found yet does not mean that nothing is there
-  if (d.interrupted && d.verdict == Verdict::no_mismatch) d.verdict = Verdict::unknown;
+  if (search.stopped()) leave_unfinished(search, scope, d);
   add_numbers(adequacy, search.nominal_noise(), d);
   if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
@@ -294,6 +307,8 @@ const char* name_of(Verdict verdict) {
       return "DATA_FAULT";
     case Verdict::not_testable:
       return "NOT_TESTABLE";
+    case Verdict::unfinished:
+      return "UNFINISHED";
   }
   return "";
 }

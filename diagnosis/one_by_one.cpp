@@ -36,6 +36,13 @@ Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cel
   std::size_t of = 0;
   for (std::size_t n = 0; n < records.size(); ++n) {
     Diagnosis one = diagnose_one(records[n]);
+    if (one.interrupted) {
+      together.interrupted = true;
+      together.verdict = Verdict::unfinished;
+      together.tried = std::move(one.tried);
+      together.not_tried = std::move(one.not_tried);
+      return together;
+    }
     const double gain = one.base_cost - one.best_cost;
     if (!names(one.verdict) || (likeliest && gain <= likeliest->base_cost - likeliest->best_cost)) continue;
     likeliest = std::move(one);

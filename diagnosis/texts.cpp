@@ -191,6 +191,25 @@ std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {
   return text + " Check the instruments against trusted ones first.";
 }
 
+std::string names_of(const std::vector<std::size_t>& mechanisms) {
+  std::vector<std::string> names;
+  for (const std::size_t m : mechanisms) names.emplace_back(text_of_mechanism(m).name);
+  return joined(names, "and");
+}
+
+/// What was tried and what was not. No cause is named, and nothing has a probability.
+std::string unfinished_text(const Diagnosis& d, const RecordingFacts& facts) {
+  std::string text = fmt::format("Stopped before the end of the search, so no cause is named. {}", model_error(facts));
+  if (!d.candidates.empty() && !d.candidates.front().ids.empty()) {
+    const Ranked& nearest = d.candidates.front();
+    text += fmt::format(" So far {} came nearest: {} of the error.", names_of(nearest.ids),
+                        percent(nearest.explained_share));
+  }
+  text += d.tried.empty() ? " No cause was tried." : fmt::format(" Tried: {}.", names_of(d.tried));
+  if (!d.not_tried.empty()) text += fmt::format(" Not tried: {}.", names_of(d.not_tried));
+  return text + " Run it again to its end.";
+}
+
 }  // namespace
 
 const MechanismText& text_of_mechanism(std::size_t mechanism) { return knowledge_of(mechanism).text; }
@@ -214,6 +233,8 @@ std::string statement(const Diagnosis& d, const RecordingFacts& facts) {
     case Verdict::not_testable:
       return d.withheld.empty() && !goes_beyond_healthy(d) ? "No diagnosis is possible from this recording."
                                                            : withheld_text(d, model_error(facts));
+    case Verdict::unfinished:
+      return unfinished_text(d, facts);
   }
   return "";
 }
@@ -307,8 +328,7 @@ void describe(Diagnosis& d, const model::CellParameters<>& cell, const std::vect
     }
   }
   facts.error_v = error.root();
-  if (d.statement.empty())
-    d.statement = (d.interrupted ? "Stopped before the end; known so far: " : "") + statement(d, facts);
+  if (d.statement.empty()) d.statement = statement(d, facts);
   for (Finding& f : d.findings) {
     if (f.because.empty()) f.because = because(d, f, facts);
   }

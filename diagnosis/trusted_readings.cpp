@@ -130,7 +130,7 @@ std::vector<PreparedRecording> as_trusted(const std::vector<PreparedRecording>& 
 Diagnosis with_instrument_errors(Diagnosis d, const std::vector<InstrumentError>& errors,
                                  const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
                                  const std::vector<PreparedRecording>& records) {
-  if (errors.empty() || d.verdict == Verdict::data_fault) return d;
+  if (errors.empty() || d.verdict == Verdict::data_fault || d.interrupted) return d;
   if (d.verdict == Verdict::unknown)
     d.warnings.emplace_back("what the trusted instruments read of the cell is not explained by its file");
   extend(d, errors, cell, own);

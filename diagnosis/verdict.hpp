@@ -20,7 +20,7 @@
 
 namespace bms::diagnosis {
 
-enum class Verdict { no_mismatch, cause, causes, ambiguous, unknown, data_fault, not_testable };
+enum class Verdict { no_mismatch, cause, causes, ambiguous, unknown, data_fault, not_testable, unfinished };
 const char* name_of(Verdict verdict);
 
 /// Whether the verdict names mechanisms.
@@ -142,10 +142,11 @@ struct RecordingView {
 
 struct Diagnosis {
   Verdict verdict = Verdict::not_testable;
-  std::string statement;           ///< what is wrong, how sure, what to do next
-  std::vector<model::Span> spans;  ///< of the first record
-  std::vector<Regime> regimes;     ///< the sharpest first
-  bool interrupted = false;        ///< Options::stopped: later fits might have changed the verdict
+  std::string statement;                      ///< what is wrong, how sure, what to do next
+  std::vector<model::Span> spans;             ///< of the first record
+  std::vector<Regime> regimes;                ///< the sharpest first
+  bool interrupted = false;                   ///< Options::stopped: the verdict is `unfinished`, and nothing is named
+  std::vector<std::size_t> tried, not_tried;  ///< then: mechanisms that were fitted, and those that were not
   double explained_share = 0;
   std::vector<Finding> findings;   ///< the largest gain first
   std::vector<Ranked> candidates;  ///< the largest gain first

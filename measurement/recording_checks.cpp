@@ -22,7 +22,9 @@ constexpr double milliampere_factor = 20;  ///< median current over the cell's l
 constexpr double largest_c_rate = 60;      ///< [1/h] no cell sustains more
 constexpr double voltage_margin_v = 0.05;  ///< beyond the limits of the cell file
 constexpr double current_margin_factor = 1.05;
-constexpr double most_capacities = 1.25;    ///< that a current can move in one direction: a full cell, and an error
+constexpr double most_capacities = 1.25;       ///< that a current can move in one direction: a full cell, and an error
+constexpr double least_kelvin = 150;           ///< no cell is as hot in degrees C, and none as cold in kelvin
+constexpr double millisecond_capacities = 10;  ///< that a current moves if its milliseconds are read as seconds
 constexpr double millisecond_step_s = 100;  ///< the usual step of a log of 10 Hz whose milliseconds are read as seconds
 
 void check_time(Recording& r) {
@@ -65,7 +67,15 @@ void warn_outside(Recording& r, std::size_t count, const std::string& what, doub
       {"outside_cell_range", fmt::format("{} outside the cell's {} to {} {}: {}", what, low, high, unit, count)});
 }
 
-void check_voltage(Recording& r, const model::Limits& limits) {
+/// OCV of a half-charged cell.
+double middle_ocv_v(const model::OcvTable<double>& ocv) {
+  std::size_t k = 0;
+  while (k + 1 < ocv.b0_v.size && ocv.soc[k + 1] <= 0.5) ++k;
+  return ocv.b0_v[k] + ocv.b1_v[k] * 0.5;
+}
+
+void check_voltage(Recording& r, const model::CellParameters<>& cell) {
+  const model::Limits& limits = cell.limits;
   const double usual_v = upper_median(r.voltage_v.copy());
   if (usual_v > millivolt_factor * limits.voltage_max_v) {
     r.warnings.push_back(
@@ -74,7 +84,7 @@ void check_voltage(Recording& r, const model::Limits& limits) {
     return;
   }
   if (usual_v > pack_factor * limits.voltage_max_v) {
-    const double cells = std::max(2.0, std::round(2 * usual_v / (limits.voltage_min_v + limits.voltage_max_v)));
+    const double cells = std::max(2.0, std::round(usual_v / middle_ocv_v(cell.ocv)));
     r.warnings.push_back(
         {"pack_voltage", fmt::format("voltages around {:g} V look like those of about {:.0f} cells in series, expected "
                                      "one cell of at most {:g} V",
@@ -127,7 +137,7 @@ void check_charge(Recording& r, const model::CellParameters<>& cell) {
   const double moved_ah = charge_range_ah(r);
   if (!(moved_ah > most_capacities * cell.capacity_ah)) return;
   const double step_s = usual_step_s(r);
-  if (step_s >= millisecond_step_s) {
+  if (step_s >= millisecond_step_s && moved_ah > millisecond_capacities * cell.capacity_ah) {
     r.warnings.push_back(
         {"time_in_ms", fmt::format("the usual time step is {:g} and the current moves {:.1f} Ah, the cell has {:g} Ah: "
                                    "the times look like milliseconds, expected seconds",
@@ -162,15 +172,22 @@ void check_recording(Recording& r) {
 }
 
 void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
-  check_voltage(r, cell.limits);
+  check_voltage(r, cell);
   check_current(r, cell);
   check_charge(r, cell);
+  const double usual_c = r.temperature_c.empty() ? 0 : upper_median(r.temperature_c.copy());
+  if (usual_c > least_kelvin) {
+    r.warnings.push_back(
+        {"temperature_in_k", fmt::format("temperatures around {:g} look like kelvin, expected degrees C", usual_c)});
+    return;
+  }
   warn_outside(r, count_outside(r.temperature_c, cell.limits.temperature_min_c, cell.limits.temperature_max_c),
                "temperatures", cell.limits.temperature_min_c, cell.limits.temperature_max_c, "degrees C");
 }
 
 std::string contradiction(const Recording& r) {
   for (const Warning& w : r.warnings) {
+    if (w.id == "temperature_in_k") return w.text + ": --unit temperature_c=K";
     if (w.id == "voltage_in_mv") return w.text + ": --unit voltage_v=mV";
     if (w.id == "current_in_ma") return w.text + ": --unit current_a=mA";
     if (w.id == "pack_voltage") return w.text + ": --map pack_voltage_v=COLUMN --series N, or the columns of the cells";

@@ -124,7 +124,7 @@ Json candidates_of(const diagnosis::Diagnosis& d) {
   Json list = Json::array();
   for (const diagnosis::Ranked& c : d.candidates) {
     list.push_back({{"ids", ids_of(c.ids)},
-                    {"probability", number(c.probability)},
+                    {"probability", d.interrupted ? Json(nullptr) : number(c.probability)},
                     {"log_likelihood_gain", number(c.gain)},
                     {"explained_share", number(c.explained_share)}});
   }
@@ -177,6 +177,18 @@ Json beyond_of(const diagnosis::HealthyCoverage& covered) {
                     {"recorded", range_of(b.recorded)},
                     {"healthy", range_of(b.healthy)}});
   return list;
+}
+
+Json not_testable_of(const diagnosis::Diagnosis& d) {
+  Json list = Json::array();
+  for (const diagnosis::NotTestable& n : d.not_testable)
+    list.push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
+  return list;
+}
+
+/// Of an unfinished one.
+Json search_of(const diagnosis::Diagnosis& d) {
+  return d.interrupted ? Json{{"tried", ids_of(d.tried)}, {"not_tried", ids_of(d.not_tried)}} : Json(nullptr);
 }
 
 Json healthy_of(const diagnosis::Diagnosis& d) {
@@ -244,6 +256,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   if (r.named()) {
     for (const diagnosis::Finding& f : d.findings) json["mechanisms"].push_back(mechanism_of(f));
   }
+  json["search"] = search_of(d);
   json["healthy"] = healthy_of(d);
   json["withheld"] = withheld_of(d);
   json["candidates"] = candidates_of(d);
@@ -271,9 +284,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                              {"step_s", number(d.resistances->step_s)},
                                              {"cell", resistances_of(d.resistances->cell)}}
                                       : Json(nullptr);
-  json["not_testable"] = Json::array();
-  for (const diagnosis::NotTestable& n : d.not_testable)
-    json["not_testable"].push_back({{"id", model::catalogue[n.mechanism].id}, {"reason", n.reason}});
+  json["not_testable"] = not_testable_of(d);
   json["next_experiment"] = r.next ? experiment_of(*r.next, r.then) : Json(nullptr);
   json["nothing_more"] = r.nothing_more.empty() ? Json(nullptr) : Json(r.nothing_more);
   json["faults"] = Json::array();

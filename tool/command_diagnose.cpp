@@ -23,9 +23,10 @@ namespace bms::tool {
 
 namespace {
 
+constexpr int exit_interrupted = 130;  ///< as a shell reports a program that Ctrl-C ended
 volatile std::sig_atomic_t interrupts = 0;
 
-/// The first Ctrl-C ends the search with what is known, the second one the program.
+/// The first Ctrl-C ends the search and says what was tried, the second one ends the program.
 void on_interrupt(int) {
   interrupts = 1;
   static_cast<void>(std::signal(SIGINT, SIG_DFL));
@@ -52,6 +53,7 @@ std::string finding_text(const diagnosis::Diagnosis& d, const diagnosis::Finding
 
 std::string comparison_text(const workflow::DiagnoseResult& r) {
   std::string text;
+  if (r.diagnosis.interrupted) return text;
   if (r.baseline && r.extended && r.named()) {
     const std::string after = diagnosis::millivolts(r.extended->rmse_v),
                       adjusted = diagnosis::millivolts(r.diagnosis.unexplained_rmse_v);
@@ -197,20 +199,20 @@ class DiagnoseCommand final : public Command {
     for (const measurement::Warning& w : input.warnings) warn(w.text);  // before the search: it may be in vain
     const std::size_t said = input.warnings.size();
     workflow::DiagnoseResult result = workflow::diagnose_recordings(std::move(input), options);
-    if (result.diagnosis.interrupted) {
-      result.warnings.push_back(
-          {"interrupted", "stopped by Ctrl-C: later steps of the search might have changed this result"});
+    const bool unfinished = result.diagnosis.interrupted;
+    if (unfinished) {
+      result.warnings.push_back({"interrupted", "stopped by Ctrl-C: no cell file was written"});
     } else {
       workflow::add_next_experiment(o_, result);
+      workflow::judge_holdouts(o_, result);
+      result.out = out_;
     }
-    workflow::judge_holdouts(o_, result);
-    result.out = out_;
     for (std::size_t k = said; k < result.warnings.size(); ++k) warn(result.warnings[k].text);
-    if (!out_.empty()) write_output(out_, files::cell_text(result.extended_cell));
+    if (!out_.empty() && !unfinished) write_output(out_, files::cell_text(result.extended_cell));
     if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
     if (!output_.report.empty()) write_output(output_.report, reports::diagnosis_report(result));
     print_summary(output_, summary(result));
-    return 0;
+    return unfinished ? exit_interrupted : 0;
   }
 
   workflow::DiagnoseOptions o_;

@@ -154,6 +154,31 @@ DiagnoseInput read_diagnose_input(const DiagnoseOptions& options) {
   return input;
 }
 
+namespace {
+
+/// Units that the file's own numbers contradict: a fault of the data, which no physics explains. Nothing if they
+/// agree. Millivolts and milliamperes are found by the diagnosis itself.
+std::optional<diagnosis::Diagnosis> wrong_units(const DiagnoseResult& r) {
+  for (const RecordingComparison& c : r.recordings) {
+    for (const measurement::Warning& w : c.recording.warnings) {
+      if (w.id != "pack_voltage" && w.id != "time_in_ms" && w.id != "temperature_in_k") continue;
+      diagnosis::Diagnosis d;
+      d.cell = r.cell.parameters;
+      d.verdict = diagnosis::Verdict::data_fault;
+      const char* option = "--map pack_voltage_v=COLUMN --series N";
+      if (w.id == "time_in_ms") option = "--unit time_s=ms";
+      if (w.id == "temperature_in_k") option = "--unit temperature_c=K";
+      d.statement = fmt::format("{}. Correct the file, or say it: {}.", diagnosis::capitalised(w.text), option);
+      d.faults.push_back({w.id, d.statement, {{c.record.time_s.front(), c.record.time_s.back()}}});
+      d.spans = d.faults.front().spans;
+      return d;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options& options) {
   const auto begin = std::chrono::steady_clock::now();
   DiagnoseResult r;
@@ -166,7 +191,10 @@ DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options
   for (const RecordingComparison& c : r.recordings) records.push_back(c.record);
   diagnosis::Options with_healthy = options;
   with_healthy.healthy = r.cell.healthy;
-  r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, with_healthy);
+  if (auto fault = wrong_units(r))
+    r.diagnosis = std::move(*fault);
+  else
+    r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, with_healthy);
   diagnosis::describe(r.diagnosis, r.cell.parameters, records);
   for (const std::string& text : r.diagnosis.warnings) r.warnings.push_back({"readings", text});
   compare_recordings(r);

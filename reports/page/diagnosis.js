@@ -10,7 +10,8 @@
     AMBIGUOUS: amber,
     UNKNOWN: '#7a4fb0',
     DATA_FAULT: '#b3261e',
-    NOT_TESTABLE: grey
+    NOT_TESTABLE: grey,
+    UNFINISHED: grey
   };
   const sentence = text => text.charAt(0).toUpperCase() + text.slice(1);
   /// The name of a mechanism without its article.
@@ -57,8 +58,10 @@
     draw(s, 'text', {x: width, y: y + 4, class: 'end'}, r.text);
   };
   /// options: {left, right: margins; each: height of a row; foot: space below}
-  const bars = (box, rows, {left, right, each = 20, foot = 0}) => {
-    const width = Math.max(240, box.clientWidth), room = width - left - right;
+  const bars = (box, rows, {left: least, right, each = 20, foot = 0}) => {
+    const width = Math.max(240, box.clientWidth), longest = Math.max(0, ...rows.map(r => r.name.length));
+    const left = Math.max(least, Math.min(6.1 * longest + 12, width - right - 90));  // so that no name is cut
+    const room = width - left - right;
     const s = svg(box, width, rows.length * each + foot);
     const x = v => left + room * Math.max(0, Math.min(1, v));
     rows.forEach((r, k) => draw_bar(s, r, x, k * each + each / 2, {left, room, width}));
@@ -219,7 +222,7 @@
     box.textContent = '';
     const none = report.verdict === 'NO_MISMATCH' ? 'No known cause would improve the model significantly.' :
                                                     'No mechanism was fitted.';
-    if (report.candidates.length)
+    if (report.candidates.length && report.verdict !== 'UNFINISHED')
       draw_candidates(box);
     else
       make(box, 'p', none, 'why');

@@ -294,7 +294,7 @@ TEST(Diagnose, WhatIsCertainIsNotGivenUpForAnotherSet) {
               ElementsAre(model::mechanism_index("resistance_growth")));
 }
 
-TEST(Diagnose, WhenStoppedItSaysWhatIsKnownSoFar) {
+TEST(Diagnose, WhenStoppedItNamesNothingAndSaysWhatWasTried) {
   const PreparedRecording r = test::recorded(test::drive(2, 12), 0.7, 12,
                                              [](std::size_t, double current_a, double) { return 0.003 * current_a; });
   int asked = 0;
@@ -307,11 +307,19 @@ TEST(Diagnose, WhenStoppedItSaysWhatIsKnownSoFar) {
     return d;
   };
   const Diagnosis nothing = after(0), some = after(6);
-  EXPECT_TRUE(nothing.interrupted);
-  EXPECT_NE(nothing.verdict, Verdict::no_mismatch) << "nothing was tried";
-  EXPECT_THAT(nothing.statement, testing::StartsWith("Stopped before the end"));
-  EXPECT_TRUE(some.interrupted);
-  EXPECT_THAT(ids_of(some), Contains("resistance_growth"));
+  for (const Diagnosis* d : {&nothing, &some}) {
+    EXPECT_TRUE(d->interrupted);
+    EXPECT_EQ(d->verdict, Verdict::unfinished);
+    EXPECT_TRUE(d->findings.empty()) << "what was not tried may explain as much";
+    EXPECT_THAT(d->statement, testing::StartsWith("Stopped before the end of the search, so no cause is named."));
+    EXPECT_THAT(d->statement, testing::Not(testing::HasSubstr("probability")));
+    EXPECT_THAT(d->not_tried, Contains(model::mechanism_index("leakage")));
+    EXPECT_THAT(d->statement, testing::HasSubstr("Not tried: "));
+  }
+  EXPECT_TRUE(nothing.tried.empty());
+  EXPECT_THAT(some.tried, Contains(model::mechanism_index("resistance_growth")));
+  const Options whole;
+  EXPECT_THAT(ids_of(diagnose(test::table9(), {}, {r}, whole)), Contains("resistance_growth"));
 }
 
 /// Next to a misfit that is tolerated: as a fault grows, it is first tolerated as well, then named.

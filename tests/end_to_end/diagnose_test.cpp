@@ -8,6 +8,7 @@
 #include <functional>
 #include <regex>
 
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "model/catalogue.hpp"
@@ -176,6 +177,40 @@ TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
   EXPECT_EQ(r["coverage"]["recording"], 1.0);
   EXPECT_EQ(r["coverage"]["holdout"], 0.5) << "both together";
   EXPECT_EQ(r["holdouts"][1]["coverage"], 0.0);
+}
+
+TEST_F(DiagnoseTool, StoppedByCtrlCItNamesNothing) {
+  const std::string recording = simulated("now.csv", "leakage:current_a=0.12");
+  const int status = std::system(
+      ("timeout --preserve-status -s INT 1 \"" BMS_TOOL "\" diagnose --cell table9 --recording " + recording +
+       " --initial-soc 0.98 --out " + path("x.toml") + " --json " + path("r.json") + " --quiet 2>" + path("err"))
+          .c_str());
+  EXPECT_EQ(WEXITSTATUS(status), 130);
+  EXPECT_FALSE(std::filesystem::exists(path("x.toml"))) << "no cell file";
+  const json r = json::parse(content(path("r.json")));
+  EXPECT_EQ(r["verdict"], "UNFINISHED");
+  EXPECT_TRUE(r["mechanisms"].empty());
+  for (const json& c : r["candidates"]) EXPECT_TRUE(c["probability"].is_null());
+  EXPECT_FALSE(r["search"]["not_tried"].empty());
+  EXPECT_THAT(r["statement"].get<std::string>(), Not(HasSubstr("No other known mechanism")));
+}
+
+/// What a warning knows already is the verdict.
+TEST_F(DiagnoseTool, AWrongUnitThatTheNumbersShowIsADataFault) {
+  std::string pack = "time_s,current_a,voltage_v\n", milli = pack;
+  for (int k = 0; k < 3'000; ++k) {
+    const double a = k % 100 < 50 ? -6 : 2;
+    pack += fmt::format("{},{},{}\n", k, a, 16 * (3.29 + 0.014 * a));
+    milli += fmt::format("{},{},{}\n", 1'000 * k, a, 3.29 + 0.014 * a);
+  }
+  std::ofstream(path("pack.csv")) << pack;
+  std::ofstream(path("milli.csv")) << milli;
+  const json of_pack = result("--cell table9 --initial-soc 0.9 --recording " + path("pack.csv"));
+  EXPECT_EQ(of_pack["verdict"], "DATA_FAULT");
+  EXPECT_THAT(of_pack["statement"].get<std::string>(), HasSubstr("of about 16 cells in series"));
+  const json of_milli = result("--cell table9 --initial-soc 0.9 --recording " + path("milli.csv"));
+  EXPECT_EQ(of_milli["verdict"], "DATA_FAULT");
+  EXPECT_THAT(of_milli["statement"].get<std::string>(), HasSubstr("look like milliseconds"));
 }
 
 TEST_F(DiagnoseTool, HasAllFieldsOfTheContractForEveryVerdict) {
