@@ -57,9 +57,10 @@ bool is_own_fault(int signal) {
   return signal == SIGSEGV || signal == SIGABRT || signal == SIGFPE || signal == SIGILL || signal == SIGBUS;
 }
 
-/// Returns the exit code as a shell has it; negative if the unit did not end by itself.
+/// Returns the exit code as a shell has it; negative if the unit did not end by itself, or was interrupted.
 int exit_code_of(int status) {
-  if (WIFEXITED(status)) return WEXITSTATUS(status);
+  constexpr int interrupted = 130;
+  if (WIFEXITED(status)) return WEXITSTATUS(status) == interrupted ? -1 : WEXITSTATUS(status);
   return is_own_fault(WTERMSIG(status)) ? 128 + WTERMSIG(status) : -1;
 }
 
@@ -75,11 +76,15 @@ class Runner {
   RunCounts run() {
     std::size_t index = 0;
     read_manifest(depot_.manifest().string(), "table9", [&](const Unit& unit) {
-      if (index++ % options_.parts != options_.part || stopped()) return;
+      if (index++ % options_.parts != options_.part) return;
       ++counts_.units;
       if (is_finished(depot_, unit)) {
         ++counts_.skipped;
         return report();
+      }
+      if (stopped()) {
+        ++counts_.unfinished;
+        return;
       }
       start(unit);
       while (running_.size() >= options_.jobs && !stopped()) wait_for_one();

@@ -183,8 +183,10 @@ class RunAction {
         {"recordings", counts.units}, {"finished_before", counts.skipped}, {"ran", counts.ran},
         {"errors", counts.errors},    {"unfinished", counts.unfinished},   {"rows", merged.rows}};
     if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(1) + "\n");
-    print_summary(o_.output, fmt::format("{} recordings: {} finished before, {} now, {} of these with an error.",
-                                         counts.units, counts.skipped, counts.ran, counts.errors));
+    print_summary(o_.output,
+                  fmt::format("{} recordings: {} finished before, {} now, {} of these with an error{}.", counts.units,
+                              counts.skipped, counts.ran, counts.errors,
+                              counts.unfinished > 0 ? fmt::format("; {} are not finished", counts.unfinished) : ""));
     if (merged.errors > 0)
       warn(fmt::format("{} of {} recordings have an error; the rows of fleet.csv say which", merged.errors,
                        merged.recordings));

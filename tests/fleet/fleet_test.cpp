@@ -88,6 +88,22 @@ TEST_F(FleetTool, ABadRecordingIsARowWithItsErrorAndTheOthersHaveResults) {
   EXPECT_TRUE(std::filesystem::exists(path("out/fleet.sqlite")));
 }
 
+TEST_F(FleetTool, WhenInterruptedItCountsAllRecordingsOfTheManifest) {
+  std::ofstream manifest(path("depot.csv"));
+  manifest << "recording,cell\n";
+  for (int k = 0; k < 30; ++k) {
+    write_recording("logs/r" + std::to_string(k) + ".csv", k, 20'000);
+    manifest << "logs/r" << k << ".csv,table9\n";
+  }
+  manifest.close();
+  std::system(("timeout --preserve-status -s INT 0.7 \"" BMS_TOOL "\" fleet run --manifest " + path("depot.csv") +
+               " --task replay --jobs 1 --out " + path("out") + " --json " + path("run.json") + " >/dev/null 2>&1")
+                  .c_str());
+  const json counts = json::parse(content(path("run.json")));
+  EXPECT_EQ(counts["recordings"], 30);
+  EXPECT_EQ(counts["ran"].get<int>() + counts["unfinished"].get<int>(), 30);
+}
+
 TEST_F(FleetTool, TheCommandOfARowReproducesIt) {
   write_depot(1);
   ASSERT_EQ(run("out").exit_code, 0);
