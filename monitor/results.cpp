@@ -111,8 +111,56 @@ std::string json_of(const BusState& bus, const ScreenFacts& facts, double silent
   return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+namespace {
+
+constexpr double most_of_a_cell_v = 5;  ///< a higher voltage is that of a pack
+/// Messages with numbered signals, and the columns of a recording that they fill.
+struct Numbered {
+  std::string_view message, signal, column;
+};
+constexpr Numbered numbered[] = {{"CellVoltages", "Cell", "v_"}, {"Temperatures", "Temperature", "t_"}};
+
+/// Calls use(column, value) for the column of each cell and sensor; the value is NaN if it is not known.
+template <class Use>
+void each_numbered(const BusState& bus, Use&& use) {
+  for (const Numbered& n : numbered) {
+    for (std::size_t k = 0; k < messages().size(); ++k) {
+      if (!std::string_view(messages()[k].name).starts_with(n.message)) continue;
+      for (std::size_t s = 0; s < messages()[k].signals.size(); ++s) {
+        const std::string_view name = messages()[k].signals[s].name;
+        if (!name.starts_with(n.signal)) continue;
+        use(fmt::format("{}{}", n.column, name.substr(n.signal.size())),
+            bus.stale(k) ? std::nan("") : bus.states()[k].values[s]);
+      }
+    }
+  }
+}
+
+/// The columns of a recording: of a pack voltage_v is the mean of the cells.
+struct RecordedVoltages {
+  double cell_v = std::nan(""), pack_v = std::nan("");
+};
+RecordedVoltages voltages_of(const BusState& bus) {
+  double sum = 0;
+  std::size_t cells = 0;
+  each_numbered(bus, [&](const std::string& column, double value) {
+    if (!column.starts_with("v_") || !std::isfinite(value)) return;
+    sum += value;
+    ++cells;
+  });
+  const Reading of_sample = bus.reading("PackElectrical", "Voltage"), of_pack = bus.reading("PackVoltage", "Voltage");
+  const double sample_v = of_sample.stale ? std::nan("") : of_sample.value;
+  const double pack_v = of_pack.stale ? sample_v : of_pack.value;
+  if (cells > 0) return {std::round(1e6 * sum / static_cast<double>(cells)) / 1e6, pack_v};
+  return sample_v > most_of_a_cell_v ? RecordedVoltages{std::nan(""), pack_v}
+                                     : RecordedVoltages{sample_v, std::nan("")};
+}
+
+}  // namespace
+
 std::string csv_head() {
-  std::string head = "time_s,current_a,voltage_v,temperature_c";
+  std::string head = "time_s,current_a,voltage_v,temperature_c,pack_voltage_v";
+  each_numbered(BusState(), [&](const std::string& column, double) { head += "," + column; });
   for (const MessageInfo& message : messages()) {
     for (const SignalInfo& signal : message.signals)
       head += fmt::format(",{}.{}", message.name, signal.name) +
@@ -132,10 +180,14 @@ std::string csv_row(const BusState& bus) {
     else
       fmt::format_to(out, "{}", value);
   };
-  for (const char* name : {"Current", "Voltage", "Temperature"}) {
-    const Reading r = bus.reading("PackElectrical", name);
-    field(r.value, false, !r.stale);
-  }
+  const RecordedVoltages voltages = voltages_of(bus);
+  const Reading current = bus.reading("PackElectrical", "Current"),
+                temperature = bus.reading("PackElectrical", "Temperature");
+  field(current.value, false, !current.stale);
+  field(voltages.cell_v, false, true);
+  field(temperature.value, false, !temperature.stale);
+  field(voltages.pack_v, false, true);
+  each_numbered(bus, [&](const std::string&, double value) { field(value, false, true); });
   for (std::size_t k = 0; k < messages().size(); ++k) {
     const bool stale = bus.stale(k);
     for (std::size_t s = 0; s < messages()[k].signals.size(); ++s)

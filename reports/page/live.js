@@ -34,7 +34,7 @@
               legend: 'always',
               axisLabelFontSize: 12,
               gridLineColor: faint,
-              xlabel: 'time, h:mm',
+              xlabel: 'time, h:mm:ss',
               xLabelHeight: 15,
               strokeWidth: 1.5,
               connectSeparatedPoints: false,
@@ -120,8 +120,9 @@
           from = high - span;
     get('delta').textContent =
         `min ${low.toFixed(3)} V, max ${high.toFixed(3)} V, delta ${(1000 * (high - low)).toFixed(0)} mV`;
+    const spread_v = 0.02;  // a smaller one is healthy
     const colour = v => {
-      if (high === low) return blue;
+      if (high - low < spread_v) return blue;
       if (v === low) return '#c9772b';
       return v === high ? green : blue;
     };
@@ -181,13 +182,14 @@
         (p.dropped ? ` · ${p.dropped} dropped` : '') + (p.malformed ? ` · ${p.malformed} malformed` : '');
     get('soc').textContent = percent(pack.soc, 1);
     get('sigma').textContent = known(pack.soc_sigma) ? '± ' + percent(2 * pack.soc_sigma, 1) : '';
-    get('quality').textContent = [pack.soc_quality, ...pack.flags].filter(Boolean).join(' · ');
+    get('quality').textContent = [...new Set([pack.soc_quality, ...pack.flags])].filter(Boolean).join(' · ');
     soc_bar(pack);
     get('voltage').textContent = fixed(pack.voltage_v, 3, 'V');
     get('temperature').textContent = known(pack.temperature_c) ? fixed(pack.temperature_c, 1, '°C') : '';
     get('current').textContent = fixed(current, 2, 'A');
     const moving = known(current) && current !== 0, direction = current > 0 ? 'charging' : 'discharging';
-    get('direction').textContent = [moving ? direction : '', ...pack.contactor].filter(Boolean).join(' · ');
+    get('direction').textContent = [moving ? direction : '', pack.contactor[0]].filter(Boolean).join(' · ');
+    get('direction').title = pack.contactor.join(' · ');
     pairs('limits', [
       ['discharge', fixed(pack.limits.discharge_now_a, 1, 'A')],
       ['for ten seconds', fixed(pack.limits.discharge_10s_a, 1, 'A')],

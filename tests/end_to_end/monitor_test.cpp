@@ -111,6 +111,17 @@ TEST_F(Monitor, CsvIsARowForEachStatusMessageThatReplayReads) {
   EXPECT_EQ(json::parse(replay.out)["samples"], 100);
 }
 
+/// The battery's own log is the easiest input.
+TEST_F(Monitor, ALogIsImportedWithoutOptions) {
+  log(dump_of(100));
+  const ToolRun run = run_tool("import " + path("bus.log") + " --out " + path("rows.csv"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("with the battery's own messages"));
+  const std::string csv = content(path("rows.csv"));
+  EXPECT_THAT(csv, ::testing::StartsWith("time_s,current_a,voltage_v,temperature_c\n"));
+  EXPECT_GT(std::count(csv.begin(), csv.end(), '\n'), 95);
+}
+
 TEST_F(Monitor, ALogOfTheSameFramesGivesTheSameJsonByteForByte) {
   std::string text = dump_of(100);
   text +=

@@ -3,9 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <set>
 
+#include <fmt/format.h>
+
+#include "files/recording.hpp"
 #include "j1939_messages.hpp"
 #include "monitor/history.hpp"
 #include "monitor/pack_view.hpp"
@@ -290,6 +294,34 @@ TEST(Results, CsvHasAFieldForEachColumnAndOmitsStaleValues) {
   EXPECT_THAT(csv_row(bus), HasSubstr(",80,"));
   bus.advance_time(100 * second_us);
   EXPECT_EQ(csv_row(bus), "0.000000" + std::string(static_cast<std::size_t>(commas(csv_head())), ',') + "\n");
+}
+
+/// What bms diagnose --pack reads.
+TEST(Results, CsvOfAPackHasTheCellsAndTheirMeanAsARecording) {
+  BusState bus;
+  can::PackElectrical electrical;
+  electrical.current = -5;
+  electrical.voltage = 13.22F;
+  can::CellVoltages1 cells;
+  cells.cell1 = 3.301F;
+  cells.cell2 = 3.302F;
+  cells.cell4 = 3.309F;
+  receive_all(bus, {to_bus_frame(electrical.frame(0), 0), to_bus_frame(cells.frame(0), 0)});
+  EXPECT_THAT(csv_head(), HasSubstr(",v_1,v_2,"));
+  EXPECT_THAT(csv_head(), HasSubstr(",t_1,"));
+  EXPECT_THAT(csv_head(), HasSubstr(",pack_voltage_v,"));
+  std::string rows = csv_head();
+  for (int k = 0; k < 12; ++k) {
+    std::string row = csv_row(bus);
+    rows += fmt::format("{}", k) + row.substr(row.find(','));
+  }
+  const measurement::Recording r = files::parse_recording(rows, "monday.csv");
+  ASSERT_EQ(r.cell_voltage_v.size(), 4U) << "no empty columns of cells that the pack does not have";
+  EXPECT_DOUBLE_EQ(r.cell_voltage_v[0][0], 3.301);
+  EXPECT_TRUE(std::isnan(r.cell_voltage_v[2][0])) << "not known";
+  EXPECT_NEAR(r.voltage_v[0], 3.304, 1e-6) << "the mean of the cells";
+  EXPECT_DOUBLE_EQ(r.pack_voltage_v[0], 13.22);
+  EXPECT_TRUE(r.cell_temperature_c.empty());
 }
 
 TEST(History, StoresOneHourWithAtMostTwoPointsPerSecond) {
