@@ -205,6 +205,22 @@ void fill_recording(const std::string& path, CanLog& log) {
 
 }  // namespace
 
+namespace {
+
+bool begins_with_frames(const std::string& path) {
+  try {
+    const auto source = monitor::open_dump(path);
+    std::vector<monitor::BusFrame> room(1);
+    while (!source->ended()) {
+      if (source->read(room, 0) > 0) return true;
+    }
+  } catch (const monitor::SourceError&) {
+  }
+  return false;
+}
+
+}  // namespace
+
 bool is_can_log(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) return false;  // opening a pipe would take its first bytes
@@ -218,7 +234,7 @@ bool is_can_log(const std::string& path) {
     std::string_view line;
     return !lines.next(line) || line.starts_with('(');
   } catch (const files::BadInput&) {
-    return true;  // damaged: read_can_log() reports it
+    return begins_with_frames(path);  // damaged: read_can_log() reads what is left of a log
   }
 }
 

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/cell_header.hpp"
@@ -57,10 +58,34 @@ std::vector<std::string> doubts_of(const files::CellFile& cell) {
   return doubts;
 }
 
+/// "0.149 +- 0.014", with the unit.
+std::string value_of(const model::MechanismSetting& m, std::size_t k) {
+  const std::string_view unit = model::catalogue[m.index].parameter[k].unit;
+  return fmt::format("{:.4g}{}{}", m.value[k], m.deviation[k] > 0 ? fmt::format(" +- {:.2g}", m.deviation[k]) : "",
+                     unit == "1" ? "" : fmt::format(" {}", unit));
+}
+
+std::string values_of(const model::MechanismSetting& m) {
+  const model::MechanismInfo& info = model::catalogue[m.index];
+  std::string text;
+  for (std::size_t k = 0; k < info.parameters; ++k)
+    text += fmt::format("{}{} {}", k == 0 ? "" : ", ", info.parameter[k].name, value_of(m, k));
+  return text;
+}
+
+/// ", with the findings below 5.10 Ah"; empty if no finding changes the capacity.
+std::string capacity_text(const files::CellFile& cell) {
+  for (const model::MechanismSetting& m : cell.mechanisms) {
+    if (std::string_view(model::catalogue[m.index].id) == model::CapacityChange::id)
+      return fmt::format(", with the findings below {:.3g} Ah", cell.parameters.capacity_ah * (1 - m.value[0]));
+  }
+  return "";
+}
+
 std::string shown(const files::CellFile& cell) {
   const model::CellParameters<>& p = cell.parameters;
-  std::string text = fmt::format("{}: {}, {:g} Ah at {:g} degrees C. {}\n", cell.name, cell.chemistry, p.capacity_ah,
-                                 p.reference_temperature_c, cell.source);
+  std::string text = fmt::format("{}: {}, {:.5g} Ah{} at {:g} degrees C. {}\n", cell.name, cell.chemistry,
+                                 p.capacity_ah, capacity_text(cell), p.reference_temperature_c, cell.source);
   const model::Limits& l = p.limits;
   text += fmt::format("  limits  {:g} to {:g} V, {:g} A charging, {:g} A discharging, {:g} to {:g} degrees C\n",
                       l.voltage_min_v, l.voltage_max_v, l.charge_current_max_a, l.discharge_current_max_a,
@@ -74,17 +99,26 @@ std::string shown(const files::CellFile& cell) {
                         1e3 * p.rc.r1_ohm[k], p.rc.c1_f[k], p.rc.r1_ohm[k] * p.rc.c1_f[k]);
   }
   for (const model::MechanismSetting& m : cell.mechanisms)
-    text += fmt::format("  {}\n", files::table_of(model::catalogue[m.index]));
+    text += fmt::format("  {}: {}.\n    {}\n", files::table_of(model::catalogue[m.index]),
+                        diagnosis::capitalised(diagnosis::claim(m)), values_of(m));
   text.pop_back();
   return text;
 }
 
 files::PageContent plotted(const files::CellFile& cell) {
-  return {"Cell " + cell.name,
-          fmt::format("{}, {:g} Ah. {}", cell.chemistry, cell.parameters.capacity_ah, cell.source),
-          {},
-          {},
-          reports::cell_charts(cell)};
+  files::PageContent page{
+      "Cell " + cell.name,
+      fmt::format("{}, {:.5g} Ah{}. {}", cell.chemistry, cell.parameters.capacity_ah, capacity_text(cell), cell.source),
+      {},
+      {},
+      reports::cell_charts(cell)};
+  files::PageTable found{"mechanisms", "Mechanisms and errors of instruments", {"table", "meaning", "values"}, {}, ""};
+  for (const model::MechanismSetting& m : cell.mechanisms)
+    found.rows.push_back({files::text_cell(files::table_of(model::catalogue[m.index])),
+                          files::text_cell(diagnosis::capitalised(diagnosis::claim(m))),
+                          files::text_cell(values_of(m))});
+  if (!found.rows.empty()) page.tables.push_back(std::move(found));
+  return page;
 }
 
 /// Accepts the argument of an #include: a path in brackets or in quotes.

@@ -122,7 +122,12 @@ std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, c
     volts.columns[0].push_back(p.lowest_v);
     volts.columns[1].push_back(p.highest_v);
   }
-  files::PageContent page{"Hardware in the loop: " + options.board, statement, {}, {}, {soc, current, volts}};
+  files::PageContent page{
+      (options.port.empty() ? "Emulated board in the loop: " : "Hardware in the loop: ") + options.board,
+      statement,
+      {},
+      {},
+      {soc, current, volts}};
   for (const measurement::Warning& w : plan.profile.warnings) page.warnings.push_back(w.text);
   for (const files::PageTable& table : {fault_table(r), reaction_table(r)}) {
     if (!table.rows.empty()) page.tables.push_back(table);

@@ -272,7 +272,16 @@ int run_cut_trials(const ReplayOptions& options) {
   for (const measurement::Warning& warning : recording.warnings) warn(options.recording + ": " + warning.text);
   const host_sim::CutResult result = host_sim::run_cuts(cell, recording, options.cuts, scalar_of(options.scalar));
   if (!options.output.json.empty()) write_output(options.output.json, reports::json_of(result));
-  print_summary(options.output, host_sim::cut_heading() + host_sim::cut_rows(result));
+  std::string text = fmt::format("{} cuts of {}; the estimator starts again at each.\n", result.cuts, result.recording);
+  for (const host_sim::CutFigures& f : result.starts) {
+    text += fmt::format(
+        "  {}: the median error of the state of charge is {:.2f} % RMS after half an hour, the largest {:.1f} %; "
+        "{:.0f} % of "
+        "the readings lie inside two sigma",
+        f.start.title, 100 * f.median_rmse[1], 100 * f.largest[1], 100 * f.inside[1]);
+    text += f.start.off > 0 || !f.start.known ? fmt::format("; {:.0f} % recover in time.\n", 100 * f.recovered) : ".\n";
+  }
+  print_summary(options.output, text + "More figures: --json FILE.");
   return 0;
 }
 

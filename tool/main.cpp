@@ -91,6 +91,40 @@ std::string unknown_command(const std::vector<std::pair<CLI::App*, Command*>>& e
          (nearest.empty() ? "" : "; did you mean " + nearest + "?");
 }
 
+/// Why an option was not understood; empty if all are known. Their values are not looked at.
+std::string unknown_option(const CLI::App& top, int argc, char** argv) {
+  const CLI::App* app = &top;
+  for (int k = 1; k < argc; ++k) {
+    const std::string word = argv[k];
+    if (word == "--") break;
+    if (!word.starts_with("--")) {
+      const auto inner = app->get_subcommands([&](const CLI::App* a) { return a->get_name() == word; });
+      if (!inner.empty()) app = inner.front();
+      continue;
+    }
+    const std::string name = word.substr(0, word.find('='));
+    std::string nearest;
+    std::size_t changes = 3;
+    bool known = false;
+    for (const CLI::App* a = app; a != nullptr; a = a->get_parent()) {
+      known = known || a->get_option_no_throw(name) != nullptr;
+      for (const CLI::Option* option : a->get_options()) {
+        for (const std::string& other : option->get_lnames()) {
+          const std::size_t by = distance(name, "--" + other);
+          if (by >= changes) continue;
+          changes = by;
+          nearest = "--" + other;
+        }
+      }
+    }
+    if (known) continue;
+    return "no such option '" + bms::files::printable(name) + "', expected one of those of bms " +
+           (app == &top ? "" : app->get_name() + " ") + "--help" +
+           (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+  }
+  return "";
+}
+
 /// A file that is opened must not become a closed standard output, or results would be mixed. A closed pipe is an error
 /// like a full disk, not the end of the process.
 void prepare_standard_streams() {
@@ -109,6 +143,10 @@ int run(CLI::App& app, const std::vector<std::pair<CLI::App*, Command*>>& entrie
     return 0;
   }
   if (const std::string why = unknown_command(entries, first); !why.empty()) {
+    std::fprintf(stderr, "bms: %s\n", why.c_str());
+    return 2;
+  }
+  if (const std::string why = unknown_option(app, argc, argv); !why.empty()) {
     std::fprintf(stderr, "bms: %s\n", why.c_str());
     return 2;
   }

@@ -28,6 +28,12 @@ bool off() {
   return setting != nullptr && std::string_view(setting) == "off";
 }
 
+/// Without the blanks that overwrite a longer line of a terminal.
+std::string trimmed(const std::string& text) {
+  const std::size_t first = text.find_first_not_of(' '), last = text.find_last_not_of(' ');
+  return first == std::string::npos ? "" : text.substr(first, last - first + 1);
+}
+
 /// What stands on the line of the terminal. Commands and the heartbeat write from threads of their own.
 class Line {
  public:
@@ -41,7 +47,7 @@ class Line {
                    "");
       width_ = text.size();
     } else {
-      std::fprintf(stderr, "%s\n", text.c_str());
+      std::fprintf(stderr, "%s%s\n", command_.empty() ? "" : (command_ + ": ").c_str(), trimmed(text).c_str());
     }
     std::fflush(stderr);
   }
@@ -57,10 +63,24 @@ class Line {
     return std::chrono::duration<double>(Clock::now() - last_).count();
   }
   bool terminal() const { return terminal_; }
+  /// The command that the lines of a log begin with.
+  void set_command(const std::string& command) {
+    const std::lock_guard lock(mutex_);
+    command_ = command;
+  }
+  std::string latest() {
+    const std::lock_guard lock(mutex_);
+    return latest_;
+  }
+  void set_latest(const std::string& text) {
+    const std::lock_guard lock(mutex_);
+    latest_ = trimmed(text);
+  }
 
  private:
   const bool terminal_;
   std::mutex mutex_;
+  std::string command_, latest_;  ///< latest_: the share and the stage, if a command reports them
   std::size_t width_ = 0;
   Clock::time_point last_ = Clock::now();
 };
@@ -89,6 +109,7 @@ workflow::Progress progress_on_stderr(
     const std::string text = text_of(done, left_s, what);
     if (text.empty()) return;
     *shown_s = seconds;
+    line.set_latest(text);
     line.show(text);
   };
 }
@@ -96,6 +117,7 @@ workflow::Progress progress_on_stderr(
 Heartbeat::Heartbeat(std::string what) {
   if (off()) return;
   Line& line = line_of_progress();
+  line.set_command(line.terminal() ? "" : what);
   thread_ = std::jthread([&line, what = std::move(what)](const std::stop_token& stop) {
     const auto begin = Clock::now();
     const double pause_s = line.terminal() ? silent_s : every_without_terminal_s;
@@ -105,7 +127,9 @@ Heartbeat::Heartbeat(std::string what) {
     while (!stopped.wait_for(lock, stop, std::chrono::seconds(1), [&] { return stop.stop_requested(); })) {
       if (line.since_last_s() < pause_s) continue;
       const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
-      line.show(fmt::format("{}: {:.0f} s", what, seconds));
+      const std::string latest = line.latest();
+      const std::string name = line.terminal() ? what + ": " : "";
+      line.show(fmt::format("{}{:.0f} s{}{}", name, seconds, latest.empty() ? "" : ", ", latest));
     }
   });
 }

@@ -74,7 +74,7 @@ const drawing = (() => {
     const time = {axisLabelFormatter: clock, valueFormatter: clock};
     return new Dygraph(div, rows, {
       labels: [more.x || 'time', ...labels],
-      xlabel: more.x || 'time, h:mm',
+      xlabel: more.x || 'time, h:mm or h:mm:ss',
       xLabelHeight: 15,
       labelsDiv: legend,
       legend: 'always',

@@ -175,11 +175,80 @@ TEST_F(Tool, ACorrectionOfTheCurrentByItsReadingAtRestStatesItsCondition) {
   EXPECT_THAT(content(path("a.json")), HasSubstr("\"where\": \"condition\""));
 }
 
+/// The sensor reads what flows, the cell loses more.
+TEST_F(Tool, ALeakageIsNotCorrectedAtTheCurrentSensor) {
+  run_tool("simulate --cell table9 --recording " + shift + " --initial-soc 0.98 --quiet --out " + path("leak.csv") +
+           " --with leakage:current_a=0.25 --noise-v 0.001");
+  const ToolRun run = run_tool("ammeter " + path("leak.csv") + " --json " + path("a.json"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("The charge balance is short by"));
+  EXPECT_THAT(run.out, HasSubstr("leakage, internal short circuit"));
+  EXPECT_THAT(run.out, ::testing::Not(HasSubstr("current-offset")));
+  EXPECT_THAT(run.out, ::testing::Not(HasSubstr("CURRENT_MEASURED_BY_USER")));
+  EXPECT_THAT(content(path("a.json")), HasSubstr("\"enter\": []"));
+  std::string open = "time_s,current_a\n";
+  for (int k = 0; k < 600; ++k) open += std::to_string(k) + ",0.00" + std::to_string(k % 3) + "\n";
+  const ToolRun decided = run_tool("ammeter " + path("leak.csv") + " --open-contactors " + write("open.csv", open));
+  ASSERT_EQ(decided.exit_code, 0) << decided.err;
+  EXPECT_THAT(decided.out, HasSubstr("Do not correct the sensor for it"));
+}
+
 TEST_F(Tool, AShiftOfTheInitialSocIsAddedToThePrior) {
   const std::string input = "simulate --cell table9 --recording " + shift + " --quiet --out ";
   run_tool(input + path("a.csv") + " --initial-soc 0.9 --with initial_soc:shift=0.05");
   run_tool(input + path("b.csv") + " --initial-soc 0.95");
   EXPECT_EQ(content(path("a.csv")), content(path("b.csv")));
+}
+
+TEST_F(Tool, AMisspeltOptionIsNamedWithTheNearestOne) {
+  const std::pair<const char*, const char*> wrong[] = {
+      {"replay x.csv --repot x.html",
+       "bms: no such option '--repot', expected one of those of bms replay --help; did you mean --report\\?"},
+      {"cell show table9 --jsn=-",
+       "bms: no such option '--jsn', expected one of those of bms cell --help; did you mean --json\\?"},
+      {"replay x.csv --nothing-like-it", "bms: no such option '--nothing-like-it', expected one of .*--help"}};
+  for (const auto& [arguments, what] : wrong) {
+    const ToolRun run = run_tool(arguments);
+    EXPECT_EQ(run.exit_code, 2) << arguments;
+    EXPECT_THAT(run.err, MatchesRegex(std::string(what) + "\n")) << arguments;
+  }
+}
+
+TEST_F(Tool, ShowHasTheFindingsOfAnExtendedCell) {
+  std::string cell = content(BMS_SOURCE_DIR "/model/cells/table9.toml");
+  cell += "\n[mechanism.capacity_change]\nloss_fraction = 0.149\nloss_fraction_std = 0.014\n";
+  const std::string file = write("x.toml", cell);
+  const ToolRun show = run_tool("cell show " + file);
+  ASSERT_EQ(show.exit_code, 0) << show.err;
+  EXPECT_THAT(show.out, HasSubstr("6 Ah, with the findings below 5.11 Ah"));
+  EXPECT_THAT(show.out, HasSubstr("loss_fraction 0.149 +- 0.014"));
+  ASSERT_EQ(run_tool("cell plot " + file + " --report " + path("x.html")).exit_code, 0);
+  EXPECT_THAT(content(path("x.html")), HasSubstr("loss_fraction 0.149 +- 0.014"));
+}
+
+TEST_F(Tool, CutsAreSummarisedInWords) {
+  const ToolRun run = run_tool("replay " + shift + " --cuts 3");
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("3 cuts of "));
+  EXPECT_THAT(run.out, HasSubstr("  unknown: the median error of the state of charge is "));
+  EXPECT_THAT(run.out, ::testing::Not(HasSubstr("|"))) << "no table of 250 columns";
+}
+
+TEST_F(Tool, ATruncatedRecordingIsNotTakenForALogOfFrames) {
+  const std::string whole = path("s.csv.gz");
+  ASSERT_EQ(std::system(("gzip -c " + shift + " > " + whole).c_str()), 0);
+  const std::string bytes = content(whole);
+  const ToolRun run = run_tool("replay " + write("cut.csv.gz", bytes.substr(0, bytes.size() / 2)));
+  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_THAT(run.err, HasSubstr("truncated gzip input"));
+}
+
+TEST_F(Tool, TemperaturesInKelvinAreNamed) {
+  std::string log = "time_s,current_a,voltage_v,temperature_c\n";
+  for (int k = 0; k < 600; ++k)
+    log += std::to_string(k) + (k % 60 < 30 ? ",0," : ",-3,") + (k % 60 < 30 ? "3.30" : "3.26") + ",296.5\n";
+  const ToolRun run = run_tool("diagnose --cell table9 --recording " + write("k.csv", log));
+  EXPECT_THAT(run.err, HasSubstr("look like kelvin"));
 }
 
 TEST_F(Tool, AnInvalidMechanismIsRefusedInOneLineThatListsTheValidOnes) {
