@@ -264,6 +264,8 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
 
 }  // namespace
 
+void reject_without_excitation(const DataSet& record) { require_excitation({record}); }
+
 FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& simulated_v,
                      std::span<const double> current_a, double fading) {
   FitStatistics fit;

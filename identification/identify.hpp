@@ -70,6 +70,9 @@ struct Identification {
 /// Largest standard deviation of an initial SOC that counts as observed.
 inline constexpr double observable_soc_std = 0.05;
 
+/// Throws std::invalid_argument, with one sentence, if the recording is too short or its current hardly changes.
+void reject_without_excitation(const DataSet& record);
+
 /// With several nodes, neighbours are tied: they may differ as those of Table 9 do, and by more where the data show it.
 /// (The residuals of the model with constant parameters are the measure.) Without ties a node that the data hardly
 /// visit takes any value. Throws std::invalid_argument, with one sentence that names what cannot be identified and

@@ -10,6 +10,7 @@
 #include "experiments/experiment.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
+#include "identification/identify.hpp"
 #include "measurement/recording_checks.hpp"
 #include "study/best_experiment.hpp"
 #include "study/statistics.hpp"
@@ -44,6 +45,16 @@ void add_profile_charts(StudyResult& result) {
 void finish(const Fitter& fitter, Clock::time_point begin, StudyResult& result) {
   result.fits += fitter.done();
   result.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+}
+
+/// Throws BadInput or std::invalid_argument if nothing can be identified from the recording.
+StudyData part_of(const std::string& path, const model::CellParameters<>& cell, StudyResult& result) {
+  measurement::Recording r = files::read_recording(path);
+  measurement::compare_with_cell(r, cell);
+  const workflow::IdentificationData d = workflow::identification_data(r, {{std::nullopt, false}, {}, cell});
+  identification::reject_without_excitation(d.record);
+  for (const measurement::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
+  return {std::filesystem::path(path).stem().string(), d.record.data, d.record.initial_soc, d.soc_min, d.soc_max};
 }
 
 }  // namespace
@@ -90,20 +101,25 @@ StudyResult study_plant(const model::CellParameters<>& cell, const StudyOptions&
 StudyResult study_recordings(const model::CellParameters<>& cell, const std::vector<std::string>& paths,
                              const StudyOptions& options, const StudyProgress& progress) {
   const auto begin = Clock::now();
-  if (paths.size() < 2)
-    throw files::BadInput("--recordings", 1,
-                          "fewer than two recordings, expected one to identify from and one to validate with");
   StudyResult result;
-  result.source = fmt::format("{} recordings", paths.size());
   std::vector<StudyData> parts;
+  std::string skipped;
   for (const std::string& path : paths) {
-    measurement::Recording r = files::read_recording(path);
-    measurement::compare_with_cell(r, cell);
-    for (const measurement::Warning& w : r.warnings) result.warnings.push_back({w.id, path + ": " + w.text});
-    const workflow::IdentificationData d = workflow::identification_data(r, {{std::nullopt, false}, {}, cell});
-    parts.push_back(
-        {std::filesystem::path(path).stem().string(), d.record.data, d.record.initial_soc, d.soc_min, d.soc_max});
+    try {
+      parts.push_back(part_of(path, cell, result));
+    } catch (const std::exception& refused) {
+      skipped += fmt::format("{}{}", skipped.empty() ? "" : "; ", refused.what());
+      result.warnings.push_back({"skipped", fmt::format("{} is not used: {}", path, refused.what())});
+    }
   }
+  if (parts.size() < 2)
+    throw files::BadInput(
+        "--recordings", 1,
+        fmt::format("fewer than two recordings that can be used, expected one to identify from and one "
+                    "to validate with{}",
+                    skipped.empty() ? "" : "; not used: " + skipped));
+  result.source = fmt::format("{} recordings", parts.size());
+  if (parts.size() < paths.size()) result.source += fmt::format(", {} are not used", paths.size() - parts.size());
   Fitter fitter(cell, model_fits + parts.size(), progress);
   Observations observed;
   observed.not_run = "the recordings are not the experiments of the paper";

@@ -61,8 +61,8 @@ StudyResult study_plant(const model::CellParameters<>& cell, const StudyOptions&
                         const StudyProgress& progress);
 
 /// The same with models, optimisers and cross-validation on recordings instead of the plant. The models are identified
-/// from the first recording and validated with the second. Throws BadInput if there are fewer than two, or one cannot
-/// be used.
+/// from the first recording and validated with the second. A recording from which nothing can be identified is left
+/// out; a warning says why. Throws BadInput if fewer than two can be used.
 StudyResult study_recordings(const model::CellParameters<>& cell, const std::vector<std::string>& paths,
                              const StudyOptions& options, const StudyProgress& progress);
 

@@ -330,9 +330,16 @@ TEST_F(IdentifyTool, StudyAcceptsAFolderOfRecordings) {
                   .exit_code,
               0);
   }
+  // what cannot be used is left out, with the reason
+  std::string slow = "time_s,current_a,voltage_v\n";
+  for (int k = 0; k < 600; ++k) slow += std::to_string(60 * k) + ",-0.3," + std::to_string(3.35 - 0.0005 * k) + "\n";
+  std::ofstream(path("in") + "/slow.csv") << slow;
+  std::ofstream(path("in") + "/notes.csv") << "what,when\n";
   const ToolRun run =
       run_tool("study --seeds 1 --recordings " + path("in") + " --out " + path("out") + " --json " + path("r.json"));
   EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.err, HasSubstr("slow.csv is not used: the current hardly changes"));
+  EXPECT_THAT(run.err, HasSubstr("notes.csv is not used: "));
   EXPECT_THAT(content(path("out") + "/table7.csv"), HasSubstr("high_1m_low_30s,rest_5s"));
   // what needs the seven experiments of the paper is not judged on two recordings
   const json r = json::parse(content(path("r.json")));
