@@ -38,5 +38,5 @@ class CMakeBuild(build_ext):
         subprocess.run([str(part) for part in command], check=True)
 
 
-setup(version=VERSION, packages=["greybox_bms"], package_data={"greybox_bms": ["*.pyi", "py.typed"]},
+setup(version=VERSION, packages=["greybox", "greybox_bms"], package_data={"greybox_bms": ["*.pyi", "py.typed"]},
       ext_modules=[Extension("greybox_bms._core", [])], cmdclass={"build_ext": CMakeBuild}, zip_safe=False)

@@ -34,6 +34,15 @@ def columns(text):
     return {name: [row[k] for row in rows[1:]] for k, name in enumerate(rows[0])}
 
 
+class Names(unittest.TestCase):
+    def test_the_short_name_is_the_same_module(self):
+        import greybox
+        import greybox.exchange
+        self.assertIs(greybox, gb)
+        self.assertIs(greybox.exchange, gb.exchange)
+        self.assertIs(greybox.Cell, gb.Cell)
+
+
 class Bits(unittest.TestCase):
     """Every estimate of an eight-hour shift is that of the tool."""
 
