@@ -33,6 +33,7 @@ void overload(TruckWorld& world, const Pack& pack, double factor, bool charges, 
   };
   const double ms = world.run_until(opened, 1e3 * limit_s + 10'000);
   outcome.values["current"] = largest_a;
+  outcome.values["times_limit"] = factor;
   outcome.values["promised"] = limit_s;
   world.run_ms(1'500);
   const std::uint64_t seen = world.vehicle.faults_seen();

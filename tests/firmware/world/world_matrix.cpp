@@ -13,6 +13,8 @@
 //   --within N       starts no case after N minutes
 //   --known          runs nothing, the table of the outcomes of earlier runs with --continue
 //   --write          writes the tables to tests/firmware/world/README.md
+//   --json FILE      writes the counts of the scenarios that were run as one JSON object; - for standard output
+//   --quiet          prints no tables
 //
 // Exit code 1 if a case failed.
 #include <cstdio>
@@ -21,8 +23,10 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <nlohmann/json.hpp>
 
 #include "files/committed_figures.hpp"
+#include "files/text_file.hpp"
 #include "tests/firmware/world/scenarios.hpp"
 
 namespace {
@@ -39,9 +43,36 @@ constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run
 
 struct Options {
   Extent extent;
-  std::string scenario;
-  bool write = false;
+  std::string scenario, json;
+  bool write = false, quiet = false;
 };
+
+/// The counts of a scenario, under the names on which other programs rely.
+void add_counts(const Result& r, nlohmann::ordered_json& json) {
+  const std::size_t tried = r.outcomes.size(), failed = r.failed();
+  if (r.name.starts_with("starts")) json["drives"] = {{"tried", tried}, {"drove", tried - failed}};
+  if (r.name == "supply dips") json["dips"] = {{"tried", tried}, {"unsafe", failed}};
+  if (r.name == "fault matrix") {
+    double missed = 0, falsely = 0;
+    for (const Outcome& o : r.outcomes) {
+      missed += o.value("missed", 0);
+      falsely += o.value("false", 0);
+    }
+    json["matrix"] = {{"cases", tried}, {"missed", missed}, {"false", falsely}, {"failed", failed}};
+  }
+  if (r.name == "overloads") {
+    json["overloads"] = nlohmann::ordered_json::array();
+    for (const Outcome& o : r.outcomes) {
+      const double opened_s = o.value("opened", -1);
+      json["overloads"].push_back(
+          {{"name", o.name},
+           {"times_limit", o.value("times_limit", 0)},
+           {"opened_after_s", opened_s < 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(opened_s)},
+           {"cause", o.text("published")}});
+    }
+  }
+  json["failed"][r.name] = failed;
+}
 
 Options read_options(const std::vector<std::string>& words) {
   Options options;
@@ -53,6 +84,10 @@ Options read_options(const std::vector<std::string>& words) {
     };
     if (words[k] == "--write") {
       options.write = true;
+    } else if (words[k] == "--json") {
+      options.json = value();
+    } else if (words[k] == "--quiet") {
+      options.quiet = true;
     } else if (words[k] == "--continue") {
       options.extent.continues = true;
     } else if (words[k] == "--known") {
@@ -90,19 +125,26 @@ int main(int count, char** words) {
   try {
     const Options options = read_options({words + 1, words + count});
     unsigned failed = 0, cases = 0;
+    nlohmann::ordered_json json = {{"command", "world"}, {"seed", options.extent.seed}};
     for (const Scenario& scenario : scenarios) {
       if (!options.scenario.empty() && options.scenario != scenario.name) continue;
       const Result result = scenario.run(options.extent);
       failed += result.failed();
       cases += static_cast<unsigned>(result.outcomes.size());
-      fmt::print("\n{}: {} cases, {} failed\n\n{}\n", result.name, result.outcomes.size(), result.failed(),
-                 result.table);
+      add_counts(result, json);
+      if (!options.quiet)
+        fmt::print("\n{}: {} cases, {} failed\n\n{}\n", result.name, result.outcomes.size(), result.failed(),
+                   result.table);
       std::fflush(stdout);
       if (options.write) {
         bms::files::replace_figures(BMS_SOURCE_DIR "/tests/firmware/world/README.md", result.name, result.table);
       }
     }
     if (cases == 0) throw std::invalid_argument(fmt::format("no cases of '{}'", options.scenario));
+    if (options.json == "-")
+      fmt::print("{}\n", json.dump(1));
+    else if (!options.json.empty())
+      bms::files::write_file(options.json, json.dump(1) + "\n");
     return failed == 0 ? 0 : 1;
   } catch (const std::exception& e) {
     fmt::print(stderr, "world_matrix: {}\n", e.what());
