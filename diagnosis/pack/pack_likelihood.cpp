@@ -27,9 +27,10 @@ bool only_positive(Cause cause) {
 }
 
 /// Share of the cells that are taken for healthy. A median would overlook channels that are read in two groups, and
-/// heavy tails.
+/// heavy tails. In a small pack it is the median: if most cells were faulty, nothing would show what is healthy.
 double usual_share(std::size_t cells) {
-  return 1 - std::max(limits.outlying_share, limits.outlying_cells / static_cast<double>(cells));
+  constexpr double most = 0.5;
+  return 1 - std::min(most, std::max(limits.outlying_share, limits.outlying_cells / static_cast<double>(cells)));
 }
 
 /// The square of the quantile of |x|, x standard normal.

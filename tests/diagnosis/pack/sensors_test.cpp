@@ -160,6 +160,17 @@ TEST(PackLimits, AreWhatIsNamed) {
   EXPECT_EQ(tried, 6);
 }
 
+/// Of a pack of three or four cells as well, in which four faulty ones would leave none.
+TEST(PackLimits, TheSpreadOfASmallPackIsFinite) {
+  for (const std::size_t cells : {3U, 4U, 5U, 16U}) {
+    std::vector<dp::CellFit> fits = cells_with(information_of_a_shift(), dp::offset, 0.0001);
+    fits.resize(cells, fits.front());
+    const dp::Vector spread = dp::healthy_spread(fits, r0_ohm);
+    EXPECT_TRUE(spread.allFinite()) << cells;
+    EXPECT_TRUE((spread.array() >= dp::least_spread(r0_ohm).array()).all()) << cells;
+  }
+}
+
 /// A recording that shows next to nothing: no cell has more than all of its charge, so a limit cannot be larger.
 TEST(PackLimits, ThatNoCellCanHaveAreLeftOut) {
   const dp::Matrix information = 1e-12 * information_of_a_shift();
