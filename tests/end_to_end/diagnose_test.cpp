@@ -181,10 +181,11 @@ TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
 
 TEST_F(DiagnoseTool, StoppedByCtrlCItNamesNothing) {
   const std::string recording = simulated("now.csv", "leakage:current_a=0.12");
-  const int status = std::system(
-      ("timeout --preserve-status -s INT 1 \"" BMS_TOOL "\" diagnose --cell table9 --recording " + recording +
-       " --initial-soc 0.98 --out " + path("x.toml") + " --json " + path("r.json") + " --quiet 2>" + path("err"))
-          .c_str());
+  const int status = std::system(("timeout --foreground --preserve-status -s INT 1 \"" BMS_TOOL
+                                  "\" diagnose --cell table9 --recording " +
+                                  recording + " --initial-soc 0.98 --out " + path("x.toml") + " --json " +
+                                  path("r.json") + " --quiet 2>" + path("err"))
+                                     .c_str());
   EXPECT_EQ(WEXITSTATUS(status), 130);
   EXPECT_FALSE(std::filesystem::exists(path("x.toml"))) << "no cell file";
   const json r = json::parse(content(path("r.json")));

@@ -96,8 +96,9 @@ TEST_F(FleetTool, WhenInterruptedItCountsAllRecordingsOfTheManifest) {
     manifest << "logs/r" << k << ".csv,table9\n";
   }
   manifest.close();
-  std::system(("timeout --preserve-status -s INT 0.7 \"" BMS_TOOL "\" fleet run --manifest " + path("depot.csv") +
-               " --task replay --jobs 1 --out " + path("out") + " --json " + path("run.json") + " >/dev/null 2>&1")
+  std::system(("timeout --foreground --preserve-status -s INT 0.7 \"" BMS_TOOL "\" fleet run --manifest " +
+               path("depot.csv") + " --task replay --jobs 1 --out " + path("out") + " --json " + path("run.json") +
+               " >/dev/null 2>&1")
                   .c_str());
   const json counts = json::parse(content(path("run.json")));
   EXPECT_EQ(counts["recordings"], 30);
