@@ -2,7 +2,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
-#include <pty.h>
 #include <unistd.h>
 
 #include <cstdlib>
@@ -12,6 +11,7 @@
 #include "monitor/candump_line.hpp"
 #include "monitor/frame_source.hpp"
 #include "tests/monitor/traffic.hpp"
+#include "tests/pseudo_terminal.hpp"
 
 namespace bms::monitor {
 namespace {
@@ -141,7 +141,7 @@ constexpr int patience_ms = 120'000;  // a limit for a failure, not for a slow m
 /// The adapter at the other end of a serial line.
 class Adapter {
  public:
-  Adapter() { EXPECT_EQ(openpty(&fd_, &other_, name_, nullptr, nullptr), 0); }
+  Adapter() { tests::open_pseudo_terminal(fd_, other_, name_, nullptr); }
   ~Adapter() {
     close(fd_);
     close(other_);
@@ -173,8 +173,12 @@ class Adapter {
   char name_[64] = {};
 };
 
-TEST(Slcan, OpensTheChannelReadsFramesAndClosesIt) {
-  const Adapter adapter;
+class Slcan : public ::testing::Test {
+ protected:
+  Adapter adapter;
+};
+
+TEST_F(Slcan, OpensTheChannelReadsFramesAndClosesIt) {
   {
     const auto source = open_source(adapter.source());
     EXPECT_EQ(adapter.received(8), "\rC\rS6\rO\r") << "the line is raw: no byte is changed";
@@ -197,8 +201,7 @@ TEST(Slcan, OpensTheChannelReadsFramesAndClosesIt) {
   EXPECT_EQ(adapter.received(2), "C\r");
 }
 
-TEST(Slcan, EndsWhenTheAdapterIsUnplugged) {
-  Adapter adapter;
+TEST_F(Slcan, EndsWhenTheAdapterIsUnplugged) {
   const auto source = open_source(adapter.source());
   adapter.unplug();
   std::vector<BusFrame> frames(8);

@@ -5,7 +5,7 @@
 #   bare_debian.sh FOLDER compiler NAME...
 #
 #   demo          ./bms demo, a newcomer's first command
-#   test          ./bms test, the second; after demo in the same root, as a newcomer does it
+#   test          ./bms test, the second; in a root of its own, so that its seconds do not depend on demo
 #   compiler      builds the tool and all tests of the host with each compiler (g++-12, clang-19, ...) and counts its
 #                 warnings by option
 #   package       makes the Debian package, installs it in another bare Debian, and uses tool, manual and completions
@@ -29,8 +29,7 @@ base=$folder/bare_$release deb=$folder/greybox-bms.deb
 say() { echo "bare_debian: $*" >&2; }
 [ "$(id -u)" = 0 ] || { say "not root, which a chroot needs"; exit 2; }
 case $way in
-  demo | package) ;;
-  test) [ -d "$folder/newcomer" ] || { say "no $folder/newcomer, run demo first"; exit 2; } ;;
+  demo | test | package) ;;
   compiler) [ $# -gt 0 ] || { say "no compiler, expected names of packages: compiler g++-12 clang-19"; exit 2; } ;;
   install | find | subdirectory | cores | python) [ -f "$deb" ] || { say "no $deb, run package first"; exit 2; } ;;
   *)
@@ -54,13 +53,13 @@ make_base() {
   cp -a /etc/ssl/certs "$base/etc/ssl/" 2>/dev/null || true
 }
 
-mounted=() keep_root=
+mounted=()
 leave() {
   local root mount
   for root in "${mounted[@]}"; do
-    for mount in sys dev proc; do umount -l "$root/$mount" 2>/dev/null || true; done
+    for mount in sys dev/pts dev proc; do umount -l "$root/$mount" 2>/dev/null || true; done
     # never delete through a mount that would not come off
-    if [ "$root" != "$keep_root" ] && ! grep -q " $root/" /proc/mounts; then rm -rf --one-file-system "$root"; fi
+    if ! grep -q " $root/" /proc/mounts; then rm -rf --one-file-system "$root"; fi
   done
 }
 trap leave EXIT
@@ -69,7 +68,7 @@ open_root() {
   local mount
   mounted+=("$1")
   cp /etc/resolv.conf "$1/etc/resolv.conf" 2>/dev/null || true
-  for mount in proc dev sys; do mount --bind "/$mount" "$1/$mount"; done
+  for mount in proc dev dev/pts sys; do mount --bind "/$mount" "$1/$mount"; done
 }
 
 # fresh NAME: a copy of the bare Debian with the project in /opt/project; sets root
@@ -79,12 +78,6 @@ fresh() {
   cp -a "$base" "$root"
   git clone -q "$project" "$root/opt/project"
   cp "$deb" "$root/opt/" 2>/dev/null || true
-  open_root "$root"
-}
-
-# kept NAME: the root that an earlier way left
-kept() {
-  root=$folder/$1
   open_root "$root"
 }
 
@@ -114,12 +107,10 @@ way_demo() {
   local start=$SECONDS
   step "./bms demo" <<<'./bms demo'
   row demo $((SECONDS - start)) "replay, verification on the emulated controller and diagnosis done"
-  keep_root=$root
 }
 
 way_test() {
-  kept newcomer
-  git -C "$root/opt/project" pull -q "$project"
+  fresh newcomer
   local start=$SECONDS
   step "./bms test" <<<'./bms test'
   row test $((SECONDS - start)) "$(grep -o '[0-9]*% tests passed.*' "$folder/test.log")"
