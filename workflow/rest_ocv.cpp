@@ -62,17 +62,19 @@ double between(const std::vector<RestedPoint>& points, const std::vector<double>
 std::vector<RestedPoint> rested_points(const measurement::Recording& r, double initial_soc, double capacity_ah) {
   std::vector<RestedPoint> points;
   double soc = initial_soc, begin_s = r.time_s.front();
-  bool rests = false;
+  bool rests = false, at_start = false;
   for (std::size_t k = 0; k < r.rows(); ++k) {
     const double a = std::isfinite(r.current_a[k]) ? r.current_a[k] : 0;
     if (k > 0) soc += a * (r.time_s[k] - r.time_s[k - 1]) / 3'600 / capacity_ah;
     const bool now = std::abs(a) < rest_c_rate * capacity_ah;
-    if (now && !rests) begin_s = r.time_s[k];
+    if (now && !rests) {
+      begin_s = r.time_s[k > 0 ? k - 1 : 0];  // the current of a row is that of the interval that ends there
+      at_start = k == 0;
+    }
     rests = now;
     const bool ends = k + 1 == r.rows() || !(std::abs(r.current_a[k + 1]) < rest_c_rate * capacity_ah);
-    // the first rest may follow anything, so its length does not matter
-    const bool at_start = begin_s == r.time_s.front();
     if (!rests || !ends || !std::isfinite(r.voltage_v[k])) continue;
+    // the first rest may follow anything, so its length does not matter
     if (r.time_s[k] - begin_s >= shortest_rest_s || (at_start && k > 0))
       points.push_back({soc, r.voltage_v[k], r.time_s[k] - begin_s});
   }
@@ -83,10 +85,10 @@ RestedOcv move_ocv_to(std::vector<RestedPoint> all, files::CellFile& cell) {
   std::erase_if(all, [](const RestedPoint& p) { return p.soc < -0.02 || p.soc > 1.02; });
   const std::vector<RestedPoint> points = merged(std::move(all));
   if (points.size() < fewest_points || points.back().soc - points.front().soc < least_range) {
-    throw std::invalid_argument(
-        fmt::format("{} rests of ten minutes or more at different states of charge, expected {} over {:.0f} % or more, "
-                    "or a slow charge or discharge with --ocv",
-                    points.size(), fewest_points, 100 * least_range));
+    throw std::invalid_argument(fmt::format(
+        "{} of ten minutes or more at different states of charge, expected {} over {:.0f} % or more, "
+        "or a slow charge or discharge with --ocv",
+        points.size() == 1 ? "1 rest" : fmt::format("{} rests", points.size()), fewest_points, 100 * least_range));
   }
   model::OcvTable<double>& ocv = cell.parameters.ocv;
   const model::OcvTable<double> before = ocv;
