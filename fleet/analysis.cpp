@@ -9,8 +9,6 @@ namespace bms::fleet {
 
 namespace {
 
-constexpr double forecast_days = 3'650;
-
 /// The most urgent causes first: what heats up, what may become a short circuit, what misleads the battery management.
 int urgency_of(const std::string& cause) {
   constexpr std::array order = {"contact_intermittent", "contact_step",    "leakage",    "current_offset",
@@ -61,20 +59,17 @@ void join(std::vector<Issue>& issues) {
   issues = std::move(joined);
 }
 
-CellTrends trends_of(const CellHistory& cell, const AnalysisOptions& options) {
-  std::vector<Reading> resistance, capacity;
+Course course_of(const CellHistory& cell, std::optional<Strength> Entry::*quantity, double limit) {
+  Course course;
   for (const Entry& e : cell.entries) {
-    if (!e.usable() || e.verdict == "UNKNOWN") continue;
-    if (e.resistance) resistance.push_back({e.day, e.resistance->value, e.resistance->sigma});
-    if (e.capacity) capacity.push_back({e.day, e.capacity->value, e.capacity->sigma});
+    if (!e.usable() || e.verdict == "UNKNOWN" || !(e.*quantity)) continue;
+    course.readings.push_back({e.day, (e.*quantity)->value, (e.*quantity)->sigma});
   }
-  CellTrends trends;
-  trends.resistance = trend_of(resistance);
-  trends.capacity = trend_of(capacity);
-  if (trends.resistance)
-    trends.resistance_crossing = crossing_of(*trends.resistance, options.resistance_limit, forecast_days);
-  if (trends.capacity) trends.capacity_crossing = crossing_of(*trends.capacity, options.capacity_limit, forecast_days);
-  return trends;
+  if (course.readings.empty()) return course;
+  course.trend = trend_of(course.readings);
+  course.outlook = outlook_of(course.readings, course.trend, limit, forecast_days);
+  if (course.trend) course.crossing = crossing_of(*course.trend, limit, forecast_days);
+  return course;
 }
 
 }  // namespace
@@ -107,7 +102,8 @@ Analysis analyse(const History& history, const AnalysisOptions& options) {
     return first != second ? first < second : a.p_value < b.p_value;
   });
   for (const CellHistory& cell : history.cells) {
-    analysis.trends.push_back(trends_of(cell, options));
+    analysis.trends.push_back({course_of(cell, &Entry::resistance, options.resistance_limit),
+                               course_of(cell, &Entry::capacity, options.capacity_limit)});
     for (const Entry& e : cell.entries) {
       analysis.usable += e.usable() ? 1 : 0;
       analysis.errors += e.error.empty() ? 0 : 1;

@@ -45,9 +45,19 @@ struct Issue {
   std::size_t cell = 0, entry = 0;  ///< the recording that shows it best: History::cells[cell].entries[entry]
 };
 
+/// A quantity of a cell over time, and when it reaches its limit.
+struct Course {
+  std::vector<Reading> readings;  ///< ascending by day
+  std::optional<Trend> trend;
+  Outlook outlook = Outlook::few_readings;
+  std::optional<Crossing> crossing;  ///< of Outlook::forecast
+};
+
+/// Longest time that a trend is continued.
+inline constexpr double forecast_days = 3'650;
+
 struct CellTrends {
-  std::optional<Trend> resistance, capacity;
-  std::optional<Crossing> resistance_crossing, capacity_crossing;
+  Course resistance, capacity;
 };
 
 struct Analysis {

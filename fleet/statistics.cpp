@@ -9,8 +9,7 @@ namespace bms::fleet {
 
 namespace {
 
-constexpr std::size_t fewest_readings = 4;  ///< of a mean or a trend
-constexpr double far_sigmas = 2;            ///< from a line, from which on a reading counts less
+constexpr double far_sigmas = 2;  ///< from a line, from which on a reading counts less
 constexpr std::size_t fewest_after =
     4;  ///< readings after an onset: of fewer, a single one that is far off would make a line
 constexpr double own_share = 0.5;  ///< of the stated sigmas that is at least not common to all readings
@@ -117,7 +116,6 @@ std::optional<Mean> mean_of(const std::vector<Reading>& readings) {
 }
 
 std::optional<Trend> trend_of(const std::vector<Reading>& readings) {
-  constexpr double shortest_days = 3;
   if (readings.size() < fewest_readings) return std::nullopt;
   double w = 0, x = 0, y = 0, least_sigma = std::numeric_limits<double>::infinity();
   for (const Reading& r : readings) {
@@ -157,6 +155,16 @@ std::optional<Crossing> crossing_of(const Trend& t, double limit, double most_da
   const double latest = after(left + t.level_sigma, t.per_day - t.per_day_sigma);
   if (latest < t.middle + most_days) c.latest = latest;
   return c;
+}
+
+Outlook outlook_of(const std::vector<Reading>& readings, const std::optional<Trend>& trend, double limit,
+                   double most_days) {
+  const Reading& last = readings.back();
+  if ((trend ? trend->at(last.day) : last.value) >= limit) return Outlook::reached;
+  if (readings.size() < fewest_readings) return Outlook::few_readings;
+  if (!trend) return Outlook::short_time;
+  if (crossing_of(*trend, limit, most_days)) return Outlook::forecast;
+  return trend->per_day > 0 && trend->per_day >= 3 * trend->per_day_sigma ? Outlook::far : Outlook::no_slope;
 }
 
 std::optional<Onset> onset_of(const std::vector<Reading>& readings, double scatter) {

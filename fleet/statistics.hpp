@@ -51,6 +51,21 @@ struct Crossing {
 /// Nothing if the slope does not lead to the limit with 3 sigma, or only after `most_days` from the trend's middle.
 std::optional<Crossing> crossing_of(const Trend& trend, double limit, double most_days);
 
+/// Whether a limit has a day: a crossing, or why it has no day.
+enum class Outlook {
+  forecast,      ///< crossing_of() has the day
+  reached,       ///< by the trend, or without one by the last reading
+  few_readings,  ///< fewer than fewest_readings
+  short_time,    ///< a trend needs shortest_days
+  no_slope,      ///< not towards the limit by 3 sigma
+  far            ///< after most_days
+};
+inline constexpr std::size_t fewest_readings = 4;  ///< of a mean or a trend
+inline constexpr double shortest_days = 3;
+/// readings: at least one, ascending by day. trend: what trend_of() says of them.
+Outlook outlook_of(const std::vector<Reading>& readings, const std::optional<Trend>& trend, double limit,
+                   double most_days);
+
 /// A value that is constant up to a day and then changes in proportion to time.
 struct Onset {
   double day = 0;  ///< of the first change

@@ -203,6 +203,7 @@ class Merger {
     if (fs::exists(depot_.result(key))) {
       rows = read(depot_.result(key), key, shared);
       counts_.errors += rows.front().error.empty() ? 0 : 1;
+      if (!rows.front().verdict.empty()) ++counts_.verdicts[rows.front().verdict];
     } else {
       rows.front().error = "not run";
       ++counts_.missing;

@@ -10,6 +10,8 @@
 #pragma once
 
 #include <cstddef>
+#include <map>
+#include <string>
 
 #include "fleet/depot.hpp"
 
@@ -17,6 +19,7 @@ namespace bms::fleet {
 
 struct MergeCounts {
   std::size_t recordings = 0, errors = 0, missing = 0, rows = 0;
+  std::map<std::string, std::size_t> verdicts;  ///< diagnose: how many recordings have each
 };
 
 /// Writes fleet.sqlite and fleet.csv, each completely or not at all. A unit without a result has the error "not run".

@@ -4,11 +4,10 @@
 #include <cmath>
 #include <map>
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "diagnosis/texts.hpp"
 #include "reports/embedded_files.hpp"
+#include "reports/fleet_texts.hpp"
 #include "reports/json_parts.hpp"
 #include "reports/report_page.hpp"
 
@@ -20,81 +19,17 @@ using fleet::Analysis;
 using fleet::History;
 using fleet::Issue;
 
-constexpr double day_s = 86'400;
-
-struct CauseText {
-  std::string name, meaning, action;
-};
-
-CauseText cause_text(const std::string& cause) {
-  if (cause == "unknown")
-    return {"a difference that none of the known causes explains",
-            "Its voltage differs from the model in a way that the diagnosis does not know.",
-            "Check the instruments against trusted ones, then look at the pages of the recordings."};
-  if (cause == "data_fault")
-    return {"faults of the data", "The recordings have wrong signs, units, clocks or missing readings.",
-            "Check the logger and its wiring."};
-  for (std::size_t m = 0; m < model::mechanism_count; ++m) {
-    const diagnosis::MechanismText& text = diagnosis::text_of_mechanism(m);
-    if (text.id == cause) return {std::string(text.name), std::string(text.meaning), std::string(text.action)};
-  }
-  return {cause, "", ""};
-}
-
-/// Without dates: the number of the recording.
-std::string date_of(const History& history, double day) {
-  if (!history.first_day_s) return fmt::format("recording {:.0f}", day + 1);
-  const auto seconds = static_cast<std::time_t>(*history.first_day_s + day_s * std::floor(day));
-  return fmt::format("{:%Y-%m-%d}", fmt::gmtime(seconds));
-}
-
-std::string place_of(const Issue& issue) {
-  const std::string truck = issue.truck.empty() ? "Battery" : "Truck " + issue.truck;
-  return issue.cell_index.empty() ? truck + ", whole battery" : truck + ", cell " + issue.cell_index;
-}
-
-std::string chance_text(double probability) {
-  if (probability < 1e-6) return "A healthy one would look like this in less than 1 of 1,000,000 cases.";
-  return fmt::format("A healthy one would look like this in 1 of {:.0f} cases.", std::max(1.0, 1 / probability));
-}
-
-std::string size_text(const Issue& issue) {
-  if (!issue.size) return "";
-  if (issue.cause == "leakage" && issue.per_day)
-    return fmt::format(" It loses {:.2f} % of its charge a day, compared with its neighbours.", 100 * *issue.per_day);
-  if (issue.per_day)
-    return fmt::format(" It changes by {:+.3g} {} a day and is now at {:+.3g} {}.", *issue.per_day, issue.unit,
-                       issue.size->value, issue.unit);
-  const bool share = issue.unit == "1";
-  return fmt::format(" Size: {:.3g} \u00b1 {:.2g} {}.", (share ? 100 : 1) * issue.size->value,
-                     (share ? 100 : 1) * issue.size->sigma, share ? "%" : issue.unit);
-}
-
-std::string why(const History& history, const Issue& issue) {
-  std::string text = fmt::format("{} of {} shifts show it", issue.seen, issue.of);
-  if (issue.onset_day) text += ", since " + date_of(history, *issue.onset_day);
-  text += "." + size_text(issue);
-  for (std::size_t k = 0; k < issue.also.size() && k < 2; ++k)
-    text += (k == 0 ? " Its recordings also name " : ", ") + cause_text(issue.also[k]).name;
-  return issue.also.empty() ? text : text + ".";
-}
-
 Json visit_of(const History& history, const Issue& issue) {
   const CauseText cause = cause_text(issue.cause);
   const fleet::Entry& shown = history.cells[issue.cell].entries[issue.entry];
-  return {{"where", place_of(issue)},
+  return {{"where", place_of(issue.truck, issue.cell_index)},
           {"what", cause.name},
-          {"why", why(history, issue) + " " + chance_text(issue.p_value)},
+          {"why", why(history, issue)},
           {"meaning", cause.meaning},
           {"action", cause.action},
           {"cell", issue.cell},
           {"page", shown.page},
           {"recording", shown.recording.substr(shown.recording.rfind('/') + 1)}};
-}
-
-std::string crossing_text(const History& history, const fleet::Crossing& c) {
-  return fmt::format("{}, between {} and {}", date_of(history, c.day), date_of(history, c.earliest),
-                     c.latest ? date_of(history, *c.latest) : "never");
 }
 
 Json forecasts_of(const History& history, const Analysis& analysis) {
@@ -105,20 +40,20 @@ Json forecasts_of(const History& history, const Analysis& analysis) {
   std::vector<Forecast> forecasts;
   for (std::size_t c = 0; c < history.cells.size(); ++c) {
     const fleet::CellTrends& t = analysis.trends[c];
-    const auto add = [&](const char* what, const std::optional<fleet::Trend>& trend,
-                         const std::optional<fleet::Crossing>& crossing) {
-      if (!trend || !crossing) return;
-      forecasts.push_back({crossing->day,
+    const auto add = [&](const char* what, const fleet::Course& course) {
+      if (!course.crossing) return;
+      const fleet::Trend& trend = *course.trend;
+      forecasts.push_back({course.crossing->day,
                            {{"cell", c},
                             {"what", what},
-                            {"now", 100 * trend->level},
-                            {"now_sigma", 100 * trend->level_sigma},
-                            {"per_month", 3'000 * trend->per_day},
-                            {"per_month_sigma", 3'000 * trend->per_day_sigma},
-                            {"when", crossing_text(history, *crossing)}}});
+                            {"now", 100 * trend.level},
+                            {"now_sigma", 100 * trend.level_sigma},
+                            {"per_month", 3'000 * trend.per_day},
+                            {"per_month_sigma", 3'000 * trend.per_day_sigma},
+                            {"when", crossing_text(history, *course.crossing)}}});
     };
-    add("resistance, growth", t.resistance, t.resistance_crossing);
-    add("capacity, loss", t.capacity, t.capacity_crossing);
+    add("resistance, growth", t.resistance);
+    add("capacity, loss", t.capacity);
   }
   std::stable_sort(forecasts.begin(), forecasts.end(), [](const auto& a, const auto& b) { return a.day < b.day; });
   Json list = Json::array();
@@ -142,7 +77,7 @@ class Numbered {
 };
 
 std::string found_text(const fleet::Entry& e) {
-  if (!e.error.empty()) return e.error;
+  if (!e.error.empty()) return reason_of(e);
   std::string text;
   for (const fleet::Named& n : e.named) text += (text.empty() ? "" : ", ") + n.mechanism;
   return text;
@@ -205,12 +140,8 @@ Json crossing_json(const History& history, const std::optional<fleet::Crossing>&
 
 }  // namespace
 
-std::string statement(const History& history, const Issue& issue) {
-  return fmt::format("{}: {}, {} of {} shifts{}", place_of(issue), cause_text(issue.cause).name, issue.seen, issue.of,
-                     issue.onset_day ? " since " + date_of(history, *issue.onset_day) : "");
-}
-
-std::string fleet_report(const History& history, const Analysis& analysis, const std::string& to_depot) {
+std::string fleet_report(const History& history, const Analysis& analysis, const fleet::AnalysisOptions& options,
+                         const std::string& to_depot) {
   Json page_data = {{"title", "What to visit first"},
                     {"statement", headline(history, analysis)},
                     {"to_depot", to_depot},
@@ -223,12 +154,13 @@ std::string fleet_report(const History& history, const Analysis& analysis, const
     page_data[issue.confirmed ? "visits" : "watch"].push_back(visit_of(history, issue));
   for (const fleet::CellHistory& cell : history.cells) page_data["cells"].push_back({cell.truck, cell.cell_index});
   page_data["forecasts"] = forecasts_of(history, analysis);
+  page_data["limits"] = limit_sentences(history, analysis, options);
   page_data["recordings"] = recordings_of(history);
   return page(embedded::fleet_html, embedded::fleet_js, "bms fleet",
               in_script(page_data.dump(-1, ' ', false, Json::error_handler_t::replace)));
 }
 
-std::string json_of(const History& history, const Analysis& analysis) {
+std::string json_of(const History& history, const Analysis& analysis, const fleet::AnalysisOptions& options) {
   Json json = {{"command", "fleet report"},     {"recordings", history.recordings}, {"errors", analysis.errors},
                {"cells", history.cells.size()}, {"trucks", analysis.trucks},        {"issues", Json::array()}};
   for (const Issue& i : analysis.issues) {
@@ -254,10 +186,16 @@ std::string json_of(const History& history, const Analysis& analysis) {
     const fleet::CellTrends& t = analysis.trends[c];
     json["ageing"].push_back({{"truck", history.cells[c].truck},
                               {"cell", history.cells[c].cell_index},
-                              {"resistance_growth", trend_json(t.resistance)},
-                              {"resistance_limit", crossing_json(history, t.resistance_crossing)},
-                              {"capacity_loss", trend_json(t.capacity)},
-                              {"capacity_limit", crossing_json(history, t.capacity_crossing)}});
+                              {"resistance_growth", trend_json(t.resistance.trend)},
+                              {"resistance_limit", crossing_json(history, t.resistance.crossing)},
+                              {"capacity_loss", trend_json(t.capacity.trend)},
+                              {"capacity_limit", crossing_json(history, t.capacity.crossing)}});
+  }
+  json["limits"] = limit_sentences(history, analysis, options);
+  json["unreadable"] = Json::array();
+  for (const fleet::CellHistory& cell : history.cells) {
+    for (const fleet::Entry& e : cell.entries)
+      if (!e.error.empty()) json["unreadable"].push_back({{"recording", e.recording}, {"reason", reason_of(e)}});
   }
   return text_of(json);
 }

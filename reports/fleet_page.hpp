@@ -7,12 +7,11 @@
 
 namespace bms::reports {
 
-/// One line for an issue: where, what, in how many recordings and since when.
-std::string statement(const fleet::History& history, const fleet::Issue& issue);
-
 /// to_depot: path from the page's folder to the depot's, for links to the pages of its recordings.
-std::string fleet_report(const fleet::History& history, const fleet::Analysis& analysis, const std::string& to_depot);
+std::string fleet_report(const fleet::History& history, const fleet::Analysis& analysis,
+                         const fleet::AnalysisOptions& options, const std::string& to_depot);
 
-std::string json_of(const fleet::History& history, const fleet::Analysis& analysis);
+std::string json_of(const fleet::History& history, const fleet::Analysis& analysis,
+                    const fleet::AnalysisOptions& options);
 
 }  // namespace bms::reports

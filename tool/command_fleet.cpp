@@ -14,6 +14,7 @@
 #include "fleet/table.hpp"
 #include "measurement/in_parallel.hpp"
 #include "reports/fleet_page.hpp"
+#include "reports/fleet_texts.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 
@@ -35,6 +36,20 @@ void stop_on_interrupt() {
 
 std::string progress_line(double done, double left_s, const std::string& what) {
   return fmt::format("{:3.0f} %, about {:.0f} s left: {:30}", 100 * done, left_s, what);
+}
+
+/// "Verdicts: 30 NO_MISMATCH, 3 CAUSE, 1 without a verdict.", the most frequent first.
+std::string verdicts_text(const fleet::MergeCounts& merged) {
+  std::vector<std::pair<std::string, std::size_t>> order(merged.verdicts.begin(), merged.verdicts.end());
+  std::stable_sort(order.begin(), order.end(), [](const auto& a, const auto& b) { return a.second > b.second; });
+  std::string text;
+  std::size_t all = 0;
+  for (const auto& [verdict, count] : order) {
+    text += fmt::format("{} {} {}", text.empty() ? "Verdicts:" : ",", count, verdict);
+    all += count;
+  }
+  if (merged.recordings > all) text += fmt::format(", {} without a verdict", merged.recordings - all);
+  return text + ".";
 }
 
 struct FleetOptions {
@@ -181,7 +196,8 @@ class RunAction {
     const nlohmann::ordered_json json = {
         {"command", "fleet run"},     {"task", name_of(depot.task)},       {"out", depot.folder.string()},
         {"recordings", counts.units}, {"finished_before", counts.skipped}, {"ran", counts.ran},
-        {"errors", counts.errors},    {"unfinished", counts.unfinished},   {"rows", merged.rows}};
+        {"errors", counts.errors},    {"unfinished", counts.unfinished},   {"rows", merged.rows},
+        {"verdicts", merged.verdicts}};
     if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(1) + "\n");
     print_summary(o_.output,
                   fmt::format("{} recordings: {} finished before, {} now, {} of these with an error{}.", counts.units,
@@ -190,6 +206,7 @@ class RunAction {
     if (merged.errors > 0)
       warn(fmt::format("{} of {} recordings have an error; the rows of fleet.csv say which", merged.errors,
                        merged.recordings));
+    if (!merged.verdicts.empty()) print_summary(o_.output, verdicts_text(merged));
     if (interrupts != 0 || counts.unfinished > 0)
       warn("not all recordings are finished; the same command continues with those that are not");
     if (interrupts == 0 && o_.part.empty())
@@ -246,17 +263,13 @@ class FleetCommand final : public Command {
                      std::string("holds results of the task ") + name_of(depot.task) + ", expected those of diagnose");
     const fleet::History history = fleet::read_history(table);
     const fleet::Analysis analysis = analyse(history, o_.analysis);
-    if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(history, analysis));
+    if (!o_.output.json.empty()) write_output(o_.output.json, reports::json_of(history, analysis, o_.analysis));
     if (!o_.output.report.empty()) {
       const auto from = std::filesystem::absolute(o_.output.report).lexically_normal().parent_path();
-      write_output(o_.output.report,
-                   reports::fleet_report(history, analysis, depot.folder.lexically_relative(from).string()));
+      write_output(o_.output.report, reports::fleet_report(history, analysis, o_.analysis,
+                                                           depot.folder.lexically_relative(from).string()));
     }
-    std::string text;
-    for (const fleet::Issue& issue : analysis.issues) {
-      if (issue.confirmed) text += reports::statement(history, issue) + "\n";
-    }
-    print_summary(o_.output, text.empty() ? "No battery needs a visit." : text.substr(0, text.size() - 1));
+    print_summary(o_.output, reports::summary(history, analysis, o_.analysis));
     return 0;
   }
 

@@ -30,11 +30,14 @@
     make(make(figure, 'p', undefined, 'note'), 'b', v.action);
   });
 
-  const table = (box, head, rows, most) => {
-    const t = make(box, 'table', undefined, 'wide');
+  const title_row = (t, head) => {
     const titles = t.insertRow();
     titles.className = 'group';
     for (const name of head) make(titles, 'td', name);
+  };
+  const table = (box, head, rows, most) => {
+    const t = make(box, 'table', undefined, 'wide texts');
+    title_row(t, head);
     for (const fill of rows.slice(0, most)) fill(t.insertRow());
     if (rows.length > most) make(box, 'p', `and ${rows.length - most} more`, 'hint');
   };
@@ -51,7 +54,8 @@
           make(row, 'td', signs(w.why));
         }),
         50);
-  get('figure-forecasts').hidden = !report.forecasts.length;
+  get('figure-forecasts').hidden = !report.forecasts.length && !report.limits.length;
+  for (const sentence of report.limits) make(get('limits'), 'p', signs(sentence), 'note');
   const with_sigma = (v, s, unit) => `${v.toFixed(1)} \u00b1 ${s.toFixed(1)} ${unit}`;
   if (report.forecasts.length)
     table(
@@ -88,7 +92,10 @@
       pointSize: 3,
       strokeWidth: 1,
       xlabel: 'time',
+      xLabelHeight: 15,
       ylabel: title + ', %',
+      yLabelWidth: 18,
+      axes: {y: {axisLabelWidth: 58}},
       axisLabelFontSize: 12,
       gridLineColor: drawing.faint,
       colors: [drawing.blue]
@@ -107,6 +114,7 @@
   if (report.cells.length) show_cell(begin);
 
   // --- all recordings
+  title_row(get('titles'), ['cell', 'date', 'verdict', 'finding, or the error']);
   let listed = [];
   const fill = () => {
     const top = Math.max(0, Math.floor(get('recordings').scrollTop / row_px) - 2), rows = get('rows');
@@ -120,7 +128,7 @@
         name.textContent = text;
       make(row, 'td', day_text(all.day[k]));
       make(row, 'td', all.verdicts[all.verdict[k]].replace(/_/g, ' '));
-      make(row, 'td', all.texts[all.found[k]]);
+      make(row, 'td', all.texts[all.found[k]]).title = all.texts[all.found[k]];
     }
   };
   const list = () => {

@@ -218,8 +218,8 @@ TEST(DepotAnalysis, AgeingIsATrendAndNotAFault) {
   for (std::size_t d = 0; d < days; ++d) depot.at(0, 0, d).resistance->value += 0.004 * static_cast<double>(d);
   const Analysis analysis = analyse(depot.history(), {});
   EXPECT_TRUE(confirmed(analysis).empty());
-  ASSERT_TRUE(analysis.trends[0].resistance_crossing);
-  EXPECT_NEAR(analysis.trends[0].resistance_crossing->day, 0.5 / 0.0043, 25);
+  ASSERT_TRUE(analysis.trends[0].resistance.crossing);
+  EXPECT_NEAR(analysis.trends[0].resistance.crossing->day, 0.5 / 0.0043, 25);
 }
 
 TEST(DepotAnalysis, OneRecordingIsNoEvidenceAndErrorsAreCounted) {

@@ -98,9 +98,46 @@ TEST(FleetPage, SaysWhatToVisitAndDrawsOnlyTheVisibleRows) {
   EXPECT_THAT(dom, HasSubstr("href=\"depot/pages/"));
   EXPECT_THAT(dom, HasSubstr("960 of 960"));
   EXPECT_GE(count(dom, "<canvas"), 2U);
+  const std::size_t titles = dom.find("id=\"titles\"");
+  ASSERT_NE(titles, std::string::npos);
+  EXPECT_THAT(dom.substr(titles, 300), HasSubstr("<td>verdict</td>"));
   const std::size_t table = dom.find("id=\"rows\"");
   ASSERT_NE(table, std::string::npos);
   EXPECT_EQ(count(dom.substr(table, dom.find("</table>", table) - table), "<tr>"), 24U);
+}
+
+/// One recording of a cell names a contact, one is not a recording, and cell 1 of truck 0 has two readings at 45 %.
+TEST(FleetPage, TheTerminalListsEveryFindingLimitAndBrokenFile) {
+  const files::TemporaryFolder folder;
+  const auto depot = folder.path() / "depot";
+  std::filesystem::create_directories(depot);
+  files::write_file(depot / "depot.json", R"({"task": "diagnose", "arguments": [], "pages": "all"})");
+  std::string manifest = "recording,cell,truck,cell_index,started_at\n";
+  const auto add = [&](const std::string& truck, const std::string& date, const json& result, const json& error) {
+    const fleet::Unit unit{"/logs/" + truck + date + ".csv", "table9", truck, "1", date};
+    manifest += unit.recording + ",table9," + truck + ",1," + date + "\n";
+    const std::string key = fleet::key_of(unit);
+    std::filesystem::create_directories(depot / "results" / key.substr(0, 2));
+    std::ofstream(depot / "results" / key.substr(0, 2) / (key + ".json"))
+        << json{{"version", "1"}, {"cell_sha256", ""}, {"recording_sha256", ""},
+                {"page", false},  {"error", error},    {"result", result}};
+  };
+  json grown = result_of("CAUSE", 0.45);
+  grown["mechanisms"][0]["id"] = "resistance_growth";
+  add("T1", "2026-01-10", grown, nullptr);
+  add("T1", "2026-05-10", grown, nullptr);
+  add("T2", "2026-05-10", result_of("CAUSE", 0.01), nullptr);
+  add("T3", "2026-05-10", nullptr, "/logs/T32026-05-10.csv:7: no column 'voltage_v', expected one");
+  files::write_file(depot / "manifest.csv", manifest);
+  ASSERT_EQ(run_tool("fleet merge " + depot.string()).exit_code, 0);
+  const ToolRun run = run_tool("fleet report " + depot.string());
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("Truck T2, cell 1: an intermittent contact, 1 of 1 shift"));
+  EXPECT_THAT(run.out, HasSubstr("is not confirmed: a healthy one is named like this in 1 of "));
+  EXPECT_THAT(run.out,
+              HasSubstr("Truck T1, cell 1: growth of the resistance 45 ± 1 % on 2026-05-10; when it reaches the "
+                        "limit of 50 % cannot be said: 2 readings, a trend needs 4."));
+  EXPECT_THAT(run.out, HasSubstr("T32026-05-10.csv: line 7: no column 'voltage_v', expected one"));
 }
 
 TEST(FleetPage, IsRefusedForOtherTasksAndWithoutATable) {

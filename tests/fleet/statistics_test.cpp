@@ -135,6 +135,23 @@ TEST(Trend, HasNoCrossingWithoutASlope) {
   EXPECT_FALSE(trend_of({{0, 1, 1}, {1, 1, 1}, {2, 1, 1}}));
 }
 
+TEST(Outlook, SaysWhyALimitHasNoDay) {
+  const auto of = [](std::vector<Reading> readings, double most_days = 3'650) {
+    return outlook_of(readings, trend_of(readings), 0.5, most_days);
+  };
+  EXPECT_EQ(of({{0, 0.1, 0.01}, {60, 0.25, 0.01}, {120, 0.4, 0.01}}), Outlook::few_readings);
+  EXPECT_EQ(of({{0, 0.1, 0.01}, {60, 0.55, 0.01}}), Outlook::reached);
+  EXPECT_EQ(of({{0, 0.1, 0.01}, {1, 0.1, 0.01}, {1.5, 0.1, 0.01}, {2, 0.1, 0.01}}), Outlook::short_time);
+  std::vector<Reading> rising, flat;
+  for (int d = 0; d < 30; ++d) {
+    rising.push_back({double(d), 0.1 + 0.005 * d, 0.01});
+    flat.push_back({double(d), 0.1 + (d % 2 ? 0.01 : -0.01), 0.01});
+  }
+  EXPECT_EQ(of(rising), Outlook::forecast);
+  EXPECT_EQ(of(rising, 10), Outlook::far);
+  EXPECT_EQ(of(flat), Outlook::no_slope);
+}
+
 TEST(FirstOfMany, IsTheDayFromWhichTheRateIsHigh) {
   EXPECT_EQ(first_of_many({false, false, false, true, true, false, true, true}), 3U);
   EXPECT_EQ(first_of_many({true, false, false, false, false, false, false, false, true, true, true, true}), 8U);
