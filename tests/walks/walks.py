@@ -275,8 +275,8 @@ def main():
                               f"      {step.get('output', '').strip()[:600]}")
         finally:
             w.close()
-    title = ["# Ten walks", "",
-             "The first minutes of ten people with the tool: what each types, what he sees, and what was expected of it.", "Written by `tests/walks/walks.py`.", ""]
+    about = "The first minutes of ten people with the tool: what each types, what he sees, and what was expected of it."
+    title = ["# Ten walks", "", about, "Written by `tests/walks/walks.py`.", ""]
     if options.page:
         with open(options.page, "w", encoding="utf-8") as page:
             page.write("\n".join(title + lines))
