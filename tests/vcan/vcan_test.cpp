@@ -10,6 +10,7 @@
 #include "files/cell_file.hpp"
 #include "images/firmware_image.hpp"
 #include "tests/end_to_end/run_tool.hpp"
+#include "tests/pseudo_terminal.hpp"
 
 namespace bms {
 namespace {
@@ -53,7 +54,12 @@ std::vector<double> column(const std::filesystem::path& csv, const std::string& 
   return values;
 }
 
-TEST(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
+/// The emulator's serial line is a pseudo-terminal.
+class Vcan : public ::testing::Test {
+  const tests::PseudoTerminal line_;
+};
+
+TEST_F(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
   constexpr int samples = 200;
   const files::TemporaryFolder folder;
   const auto part = folder.path() / "part.csv", trace = folder.path() / "trace.csv";
