@@ -203,10 +203,6 @@ void fill_recording(const std::string& path, CanLog& log) {
                                                       log.lost, log.unbroken)});
 }
 
-}  // namespace
-
-namespace {
-
 bool begins_with_frames(const std::string& path) {
   try {
     const auto source = monitor::open_dump(path);

@@ -8,6 +8,7 @@
 
 #include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
+#include "model/cell.hpp"
 
 namespace bms::measurement {
 
@@ -69,8 +70,7 @@ void warn_outside(Recording& r, std::size_t count, const std::string& what, doub
 
 /// OCV of a half-charged cell.
 double middle_ocv_v(const model::OcvTable<double>& ocv) {
-  std::size_t k = 0;
-  while (k + 1 < ocv.b0_v.size && ocv.soc[k + 1] <= 0.5) ++k;
+  const std::size_t k = model::cell_detail::ocv_piece(ocv, 0.5);
   return ocv.b0_v[k] + ocv.b1_v[k] * 0.5;
 }
 
@@ -185,12 +185,20 @@ void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {
                "temperatures", cell.limits.temperature_min_c, cell.limits.temperature_max_c, "degrees C");
 }
 
+std::string_view unit_option(const Warning& warning) {
+  if (warning.id == "time_in_ms") return "--unit time_s=ms";
+  if (warning.id == "temperature_in_k") return "--unit temperature_c=K";
+  if (warning.id == "voltage_in_mv") return "--unit voltage_v=mV";
+  if (warning.id == "current_in_ma") return "--unit current_a=mA";
+  if (warning.id == "pack_voltage") return "--map pack_voltage_v=COLUMN --series N";
+  return {};
+}
+
 std::string contradiction(const Recording& r) {
   for (const Warning& w : r.warnings) {
-    if (w.id == "temperature_in_k") return w.text + ": --unit temperature_c=K";
-    if (w.id == "voltage_in_mv") return w.text + ": --unit voltage_v=mV";
-    if (w.id == "current_in_ma") return w.text + ": --unit current_a=mA";
-    if (w.id == "pack_voltage") return w.text + ": --map pack_voltage_v=COLUMN --series N, or the columns of the cells";
+    const std::string_view option = unit_option(w);
+    if (option.empty() || w.id == "time_in_ms") continue;  // a slow log may have such steps: only diagnose refuses it
+    return fmt::format("{}: {}{}", w.text, option, w.id == "pack_voltage" ? ", or the columns of the cells" : "");
   }
   return {};
 }

@@ -18,6 +18,8 @@
 #pragma once
 
 #include <cstddef>
+#include <string>
+#include <string_view>
 
 #include "measurement/recording.hpp"
 #include "model/cell_parameters.hpp"
@@ -37,6 +39,9 @@ void check_recording(Recording& recording);
 
 /// Adds the warnings that need the limits and the capacity of a cell: units, values outside its range.
 void compare_with_cell(Recording& recording, const model::CellParameters<>& cell);
+
+/// The option of `bms import` that mends what the warning says of a unit; empty if it says nothing of one.
+std::string_view unit_option(const Warning& warning);
 
 /// The text of the first warning that no reading of this cell can explain: another unit, or a pack. Empty: none.
 std::string contradiction(const Recording& recording);

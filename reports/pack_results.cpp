@@ -117,7 +117,7 @@ files::PageTable limit_table(const dp::PackDiagnosis& d) {
     table.rows.push_back(
         {files::text_cell(text.substr(0, text.find(' '))), files::text_cell(text.substr(text.find(' ') + 1))});
   }
-  if (!d.not_visible.empty()) table.note = "Not visible in this recording: " + dp::causes_text(d.not_visible) + ".";
+  table.note = dp::not_visible_text(d);
   return table;
 }
 

@@ -276,8 +276,7 @@ int run_cut_trials(const ReplayOptions& options) {
   for (const host_sim::CutFigures& f : result.starts) {
     text += fmt::format(
         "  {}: the median error of the state of charge is {:.2f} % RMS after half an hour, the largest {:.1f} %; "
-        "{:.0f} % of "
-        "the readings lie inside two sigma",
+        "{:.0f} % of the readings lie inside two sigma",
         f.start.title, 100 * f.median_rmse[1], 100 * f.largest[1], 100 * f.inside[1]);
     text += f.start.off > 0 || !f.start.known ? fmt::format("; {:.0f} % recover in time.\n", 100 * f.recovered) : ".\n";
   }

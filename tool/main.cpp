@@ -74,21 +74,35 @@ std::size_t distance(const std::string& a, const std::string& b) {
   return row.back();
 }
 
+/// The name that is most like a word; names with more than two changes are other words.
+class Nearest {
+ public:
+  explicit Nearest(std::string word) : word_(std::move(word)) {}
+  void try_name(const std::string& name) {
+    const std::size_t by = distance(word_, name);
+    if (by >= changes_) return;
+    changes_ = by;
+    name_ = name;
+  }
+  /// "; did you mean NAME?"; empty if none is near.
+  std::string question() const { return name_.empty() ? "" : "; did you mean " + name_ + "?"; }
+
+ private:
+  std::string word_, name_;
+  std::size_t changes_ = 3;
+};
+
 /// Why the first word was not understood; empty if it is a command or an option.
 std::string unknown_command(const std::vector<std::pair<CLI::App*, Command*>>& entries, const std::string& word) {
   if (word.empty() || word.front() == '-') return "";
-  std::string nearest;
-  std::size_t changes = 3;  // more would be another word
+  Nearest nearest(word);
   for (const auto& [entry, command] : entries) {
     const std::string name = entry->get_name();
     if (name == word) return "";
-    if (const std::size_t by = distance(word, name); by < changes) {
-      changes = by;
-      nearest = name;
-    }
+    nearest.try_name(name);
   }
   return "no such command '" + bms::files::printable(word) + "', expected one of those of bms --help" +
-         (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+         nearest.question();
 }
 
 /// Why an option was not understood; empty if all are known. Their values are not looked at.
@@ -103,24 +117,17 @@ std::string unknown_option(const CLI::App& top, int argc, char** argv) {
       continue;
     }
     const std::string name = word.substr(0, word.find('='));
-    std::string nearest;
-    std::size_t changes = 3;
+    Nearest nearest(name);
     bool known = false;
     for (const CLI::App* a = app; a != nullptr; a = a->get_parent()) {
       known = known || a->get_option_no_throw(name) != nullptr;
       for (const CLI::Option* option : a->get_options()) {
-        for (const std::string& other : option->get_lnames()) {
-          const std::size_t by = distance(name, "--" + other);
-          if (by >= changes) continue;
-          changes = by;
-          nearest = "--" + other;
-        }
+        for (const std::string& other : option->get_lnames()) nearest.try_name("--" + other);
       }
     }
     if (known) continue;
     return "no such option '" + bms::files::printable(name) + "', expected one of those of bms " +
-           (app == &top ? "" : app->get_name() + " ") + "--help" +
-           (nearest.empty() ? "" : "; did you mean " + nearest + "?");
+           (app == &top ? "" : app->get_name() + " ") + "--help" + nearest.question();
   }
   return "";
 }

@@ -165,10 +165,8 @@ std::optional<diagnosis::Diagnosis> wrong_units(const DiagnoseResult& r) {
       diagnosis::Diagnosis d;
       d.cell = r.cell.parameters;
       d.verdict = diagnosis::Verdict::data_fault;
-      const char* option = "--map pack_voltage_v=COLUMN --series N";
-      if (w.id == "time_in_ms") option = "--unit time_s=ms";
-      if (w.id == "temperature_in_k") option = "--unit temperature_c=K";
-      d.statement = fmt::format("{}. Correct the file, or say it: {}.", diagnosis::capitalised(w.text), option);
+      d.statement = fmt::format("{}. Correct the file, or say it: {}.", diagnosis::capitalised(w.text),
+                                measurement::unit_option(w));
       d.faults.push_back({w.id, d.statement, {{c.record.time_s.front(), c.record.time_s.back()}}});
       d.spans = d.faults.front().spans;
       return d;

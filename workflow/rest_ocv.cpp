@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "model/cell.hpp"
+
 namespace bms::workflow {
 
 namespace {
@@ -17,8 +19,7 @@ constexpr double least_range = 0.4, same_soc = 0.01;
 constexpr double least_slope_v = 0.002;  ///< per unit of soc; a plateau rises at least so
 
 double ocv_of(const model::OcvTable<double>& ocv, double soc) {
-  std::size_t k = 0;
-  while (k + 2 < ocv.soc.size && soc >= ocv.soc[k + 1]) ++k;
+  const std::size_t k = model::cell_detail::ocv_piece(ocv, soc);
   return ocv.b0_v[k] + ocv.b1_v[k] * soc;
 }
 

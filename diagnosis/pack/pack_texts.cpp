@@ -193,19 +193,18 @@ std::string limit_text(const PackLimit& l) {
   return fmt::format("{} {}", text_of(l.cause).id, number(l.value, 0, text_of(l.cause).unit));
 }
 
-std::string causes_text(const std::vector<Cause>& causes) {
-  std::string text;
-  for (const Cause c : causes) text += fmt::format("{}{}", text.empty() ? "" : ", ", text_of(c).id);
-  return text;
+std::string not_visible_text(const PackDiagnosis& d) {
+  std::string ids;
+  for (const Cause c : d.not_visible) ids += fmt::format("{}{}", ids.empty() ? "" : ", ", text_of(c).id);
+  return ids.empty() ? "" : "Not visible in this recording: " + ids + ".";
 }
 
 std::string limits_text(const PackDiagnosis& d) {
   std::string text;
   for (const PackLimit& l : d.detection_limits) text += (text.empty() ? "" : ", ") + limit_text(l);
   if (!text.empty()) text = "Smallest sizes that would be named: " + text + ".";
-  if (!d.not_visible.empty())
-    text += fmt::format("{}Not visible in this recording: {}.", text.empty() ? "" : " ", causes_text(d.not_visible));
-  return text;
+  const std::string hidden = not_visible_text(d);
+  return text + (text.empty() || hidden.empty() ? "" : " ") + hidden;
 }
 
 std::string cells_text(const std::vector<std::size_t>& cells) {

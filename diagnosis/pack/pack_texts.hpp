@@ -25,8 +25,8 @@ std::string time_text(const PackFinding& finding);
 std::string limit_text(const PackLimit& limit);
 /// "Smallest sizes that would be named: ... Not visible in this recording: ..."
 std::string limits_text(const PackDiagnosis& d);
-/// The ids of causes, "leakage, capacity_change".
-std::string causes_text(const std::vector<Cause>& causes);
+/// "Not visible in this recording: leakage, capacity_change."; empty if all causes have a limit.
+std::string not_visible_text(const PackDiagnosis& d);
 /// The statement of the whole diagnosis.
 std::string statement_of(const PackDiagnosis& diagnosis);
 /// What confirms that channels are held: the pack's voltmeter.
