@@ -211,11 +211,13 @@ std::vector<char> Search::far_better(const HypothesisFit& around, const std::vec
   });
   std::vector<char> better(candidates.size(), 0);
   measurement::in_parallel(candidates.size(), [&](std::size_t k) {
-    if (candidates[k].gain >= candidate_limits.worth_a_fit) return;
-    if (joint_start(with(around.hypothesis, candidates[k].start))) better[k] = 1;
+    const bool promising = candidates[k].gain >= candidate_limits.worth_a_fit;
+    if (promising && k < candidate_limits.fits) return;  // is fitted, from its far starts as well
+    if (!promising && joint_start(with(around.hypothesis, candidates[k].start))) better[k] = 1;
+    const double promised = std::max(candidates[k].gain, candidate_limits.worth_a_fit);
     for (std::size_t b = 0; b < bases.size() && better[k] == 0; ++b) {
       const auto far = far_start(with(around.hypothesis, candidates[k].start), bases[b]);
-      if (far && far->cost < without[b] - candidate_limits.worth_a_fit) better[k] = 1;
+      if (far && far->cost < without[b] - promised) better[k] = 1;
     }
   });
   return better;
@@ -264,8 +266,7 @@ std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const s
     for (std::size_t k = 0; k < far.size(); ++k) {
       const Candidate& c = screen.candidates()[k];
       const bool promising = c.gain >= candidate_limits.worth_a_fit;
-      if (promising && worth.size() >= candidate_limits.fits) continue;
-      if (!promising && far[k] == 0) continue;
+      if (far[k] == 0 && (!promising || worth.size() >= candidate_limits.fits)) continue;
       if (tried.insert(c.mechanism).second || noise != nominal_) worth.push_back(c);
     }
     const std::vector<HypothesisFit> here = fitted(from, worth, {});
