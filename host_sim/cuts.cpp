@@ -9,6 +9,7 @@
 
 #include "files/bad_input.hpp"
 #include "measurement/statistics.hpp"
+#include "model/ocv_voltage.hpp"
 
 namespace bms::host_sim {
 
@@ -174,10 +175,7 @@ std::vector<std::size_t> cut_rows_of(const measurement::Recording& r, std::size_
 
 std::vector<double> ocv_knees(const model::CellParameters<>& p) {
   constexpr double side = 0.03, factor = 2.5;
-  const auto ocv_v = [&](double soc) {
-    const std::size_t k = model::cell_detail::ocv_piece(p.ocv, soc);
-    return p.ocv.b0_v[k] + p.ocv.b1_v[k] * soc;
-  };
+  const auto ocv_v = [&](double soc) { return model::ocv_voltage(p.ocv, soc); };
   std::vector<double> knees;
   for (std::size_t k = 1; k + 1 < p.ocv.soc.size; ++k) {
     const double at = p.ocv.soc[k];

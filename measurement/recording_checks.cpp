@@ -8,7 +8,7 @@
 
 #include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
-#include "model/cell.hpp"
+#include "model/ocv_voltage.hpp"
 
 namespace bms::measurement {
 
@@ -68,12 +68,6 @@ void warn_outside(Recording& r, std::size_t count, const std::string& what, doub
       {"outside_cell_range", fmt::format("{} outside the cell's {} to {} {}: {}", what, low, high, unit, count)});
 }
 
-/// OCV of a half-charged cell.
-double middle_ocv_v(const model::OcvTable<double>& ocv) {
-  const std::size_t k = model::cell_detail::ocv_piece(ocv, 0.5);
-  return ocv.b0_v[k] + ocv.b1_v[k] * 0.5;
-}
-
 void check_voltage(Recording& r, const model::CellParameters<>& cell) {
   const model::Limits& limits = cell.limits;
   const double usual_v = upper_median(r.voltage_v.copy());
@@ -84,7 +78,7 @@ void check_voltage(Recording& r, const model::CellParameters<>& cell) {
     return;
   }
   if (usual_v > pack_factor * limits.voltage_max_v) {
-    const double cells = std::max(2.0, std::round(usual_v / middle_ocv_v(cell.ocv)));
+    const double cells = std::max(2.0, std::round(usual_v / model::ocv_voltage(cell.ocv, 0.5)));
     r.warnings.push_back(
         {"pack_voltage", fmt::format("voltages around {:g} V look like those of about {:.0f} cells in series, expected "
                                      "one cell of at most {:g} V",

@@ -5,6 +5,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
+#include "model/ocv_voltage.hpp"
 #include "python/bindings.hpp"
 #include "workflow/cell_size.hpp"
 
@@ -19,15 +20,9 @@ py::array array_of(const Column& column) {
   return owned(std::vector<double>(column.value.begin(), column.value.begin() + static_cast<long>(column.size)));
 }
 
-double ocv_at(const model::OcvTable<double>& ocv, double soc) {
-  std::size_t k = 0;
-  while (k + 2 < ocv.soc.size && soc >= ocv.soc[k + 1]) ++k;
-  return ocv.b0_v[k] + ocv.b1_v[k] * soc;
-}
-
 py::array ocv_v(const CellFile& cell, const Array& soc) {
   std::vector<double> volts;
-  for (const double s : numbers(soc, "soc")) volts.push_back(ocv_at(cell.parameters.ocv, s));
+  for (const double s : numbers(soc, "soc")) volts.push_back(model::ocv_voltage(cell.parameters.ocv, s));
   return owned(std::move(volts));
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "identification/rest_reading.hpp"
+#include "model/ocv_voltage.hpp"
 
 namespace bms::study {
 
@@ -35,10 +36,9 @@ OcvObservation observe_ocv(const std::vector<id::RestedVoltage>& rests) {
   double count = 0;
   for (std::size_t k = 1; k < all.soc.size(); k += 2) {
     const double soc = all.soc[k], v = all.voltage_v[k];
-    const std::size_t piece = model::cell_detail::ocv_piece(pieces, soc);
     out.look_up_v += std::pow(entries.at(soc) - v, 2);
     out.polynomial_v += std::pow(id::polynomial_at(coefficients, soc) - v, 2);
-    out.pieces_v += std::pow(pieces.b0_v[piece] + pieces.b1_v[piece] * soc - v, 2);
+    out.pieces_v += std::pow(model::ocv_voltage(pieces, soc) - v, 2);
     ++count;
   }
   for (double* squares : {&out.look_up_v, &out.polynomial_v, &out.pieces_v}) *squares = std::sqrt(*squares / count);

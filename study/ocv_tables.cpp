@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "identification/rest_reading.hpp"
+#include "model/ocv_voltage.hpp"
 #include "study/study_tables.hpp"
 #include "study/table_cells.hpp"
 
@@ -79,10 +80,7 @@ void add_representations(const std::vector<id::RestedVoltage>& rests, StudyResul
   };
   add("look-up table", all.soc.size(), [&](double soc) { return all.at(soc); });
   add("polynomial of order 7", coefficients.size(), [&](double soc) { return id::polynomial_at(coefficients, soc); });
-  add("ten pieces", 2 * pieces.b0_v.size, [&](double soc) {
-    const std::size_t k = model::cell_detail::ocv_piece(pieces, soc);
-    return pieces.b0_v[k] + pieces.b1_v[k] * soc;
-  });
+  add("ten pieces", 2 * pieces.b0_v.size, [&](double soc) { return model::ocv_voltage(pieces, soc); });
   result.tables.push_back(std::move(table));
 
   files::PageChart curve{"OCV over state of charge (Fig. 2): rested voltages, ten pieces, polynomial",
@@ -93,11 +91,10 @@ void add_representations(const std::vector<id::RestedVoltage>& rests, StudyResul
   const id::OcvPoints down = points_of(rests, id::OcvDirection::discharge),
                       up = points_of(rests, id::OcvDirection::charge);
   for (const double soc : down.soc) {
-    const std::size_t k = model::cell_detail::ocv_piece(pieces, std::min(soc, 1 - 1e-9));
     curve.time_s.push_back(100 * soc);
     curve.columns[0].push_back(down.at(soc));
     curve.columns[1].push_back(up.at(soc));
-    curve.columns[2].push_back(pieces.b0_v[k] + pieces.b1_v[k] * soc);
+    curve.columns[2].push_back(model::ocv_voltage(pieces, soc));
     curve.columns[3].push_back(id::polynomial_at(coefficients, soc));
   }
   result.charts.push_back(std::move(curve));

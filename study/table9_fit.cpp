@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "model/ocv_voltage.hpp"
 #include "workflow/identification_data.hpp"
 
 namespace bms::study {
@@ -58,11 +59,6 @@ id::LeastSquares with_corners(const id::GreyBox& grey_box, const Eigen::MatrixXd
   return p;
 }
 
-double ocv_of(const model::OcvTable<double>& ocv, double soc) {
-  const std::size_t k = model::cell_detail::ocv_piece(ocv, std::min(soc, 1 - 1e-9));
-  return ocv.b0_v[k] + ocv.b1_v[k] * soc;
-}
-
 Table9Row row_of(Index k, const Eigen::VectorXd& x, const id::Uncertainty& u, const std::vector<double>& corner_v) {
   const Index first_corner = x.size() - corners;
   const auto parameter = [&](const char* name, Index at) {
@@ -111,7 +107,8 @@ Table9Fit fit_table9(const model::CellParameters<>& cell, const std::vector<Stud
       id::uncertainty(residuals, jacobian, static_cast<Index>(grey_box.samples()), found.at_bound, 0);
   Table9Fit out;
   for (Index k = 0; k < corners; ++k)
-    out.corner_v.push_back(ocv_of(cell.ocv, static_cast<double>(k) / tenths) + found.x[found.x.size() - corners + k]);
+    out.corner_v.push_back(model::ocv_voltage(cell.ocv, static_cast<double>(k) / tenths) +
+                           found.x[found.x.size() - corners + k]);
   for (Index k = 0; k < tenths; ++k) out.rows.push_back(row_of(k, found.x, u, out.corner_v));
   out.rmse_v = std::sqrt(residuals.squaredNorm() / static_cast<double>(grey_box.samples()));
   out.converged = found.converged;

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "model/cell.hpp"
+#include "model/ocv_voltage.hpp"
 
 namespace bms::workflow {
 
@@ -17,11 +17,6 @@ constexpr double rest_c_rate = 0.005;
 constexpr std::size_t fewest_points = 4;
 constexpr double least_range = 0.4, same_soc = 0.01;
 constexpr double least_slope_v = 0.002;  ///< per unit of soc; a plateau rises at least so
-
-double ocv_of(const model::OcvTable<double>& ocv, double soc) {
-  const std::size_t k = model::cell_detail::ocv_piece(ocv, soc);
-  return ocv.b0_v[k] + ocv.b1_v[k] * soc;
-}
 
 /// Points at nearly the same state of charge become one, because a rest after a charge and one after a discharge differ
 /// by the hysteresis.
@@ -45,7 +40,8 @@ std::vector<RestedPoint> merged(std::vector<RestedPoint> points) {
 /// The points above the curve.
 std::vector<double> shifts(const std::vector<RestedPoint>& points, const model::OcvTable<double>& ocv) {
   std::vector<double> shift;
-  for (const RestedPoint& p : points) shift.push_back(p.voltage_v - ocv_of(ocv, std::clamp(p.soc, 0.0, 1.0)));
+  for (const RestedPoint& p : points)
+    shift.push_back(p.voltage_v - model::ocv_voltage(ocv, std::clamp(p.soc, 0.0, 1.0)));
   return shift;
 }
 
@@ -113,7 +109,7 @@ RestedOcv move_ocv_to(std::vector<RestedPoint> all, files::CellFile& cell) {
   }
   std::sort(edges.begin(), edges.end());
   std::vector<double> volts;
-  for (const double soc : edges) volts.push_back(ocv_of(before, soc) + between(points, shift, soc));
+  for (const double soc : edges) volts.push_back(model::ocv_voltage(before, soc) + between(points, shift, soc));
   for (std::size_t k = 1; k < edges.size(); ++k)  // noise on a plateau must not make it fall
     volts[k] = std::max(volts[k], volts[k - 1] + least_slope_v * (edges[k] - edges[k - 1]));
   ocv = {};
