@@ -191,7 +191,7 @@ std::string_view unit_option(const Warning& warning) {
 std::string contradiction(const Recording& r) {
   for (const Warning& w : r.warnings) {
     const std::string_view option = unit_option(w);
-    if (option.empty() || w.id == "time_in_ms") continue;  // a slow log may have such steps: only diagnose refuses it
+    if (option.empty()) continue;
     return fmt::format("{}: {}{}", w.text, option, w.id == "pack_voltage" ? ", or the columns of the cells" : "");
   }
   return {};

@@ -156,7 +156,6 @@ void adapt_start(const IdentifyOptions& options, const std::vector<measurement::
 void check_size(const IdentifyOptions& options, const StartCell& start, const measurement::Recording& r) {
   if (const std::string what = measurement::contradiction(r); !what.empty()) throw files::BadInput(r.path, 1, what);
   for (const measurement::Warning& w : r.warnings) {
-    if (w.id == "time_in_ms") throw files::BadInput(r.path, 1, w.text);
     if (w.id != "charge_exceeds_capacity") continue;
     std::string origin = options.ocv.empty() ? options.start : "--ocv";
     if (options.capacity_ah > 0) origin = "--capacity-ah";

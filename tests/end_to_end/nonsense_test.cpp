@@ -49,13 +49,16 @@ TEST_F(Nonsense, MillisecondsAsSecondsAreAnErrorWithTheCause) {
   const std::string in = recording("ms.csv", 1'000);
   const ToolRun run = run_tool("replay " + in + " --quiet --json " + path("r.json") + " --report " + path("r.html"));
   EXPECT_EQ(run.exit_code, 2);
-  EXPECT_THAT(run.err, MatchesRegex("(warning: [^\n]+\n)*[^\n]*ms.csv:1: the state of charge leaves[^\n]+likely cause: "
-                                    "[^\n]+look like milliseconds[^\n]+\n"));
+  EXPECT_THAT(run.err, MatchesRegex("(warning: [^\n]+\n)*[^\n]*ms.csv:1: [^\n]+look like milliseconds[^\n]+: "
+                                    "--unit time_s=ms\n"));
   EXPECT_EQ(files(), 1U);
   const ToolRun simulated =
       run_tool("simulate --cell table9 --recording " + in + " --initial-soc 0.8 --out " + path("s.csv"));
   EXPECT_EQ(simulated.exit_code, 2);
   EXPECT_THAT(simulated.err, HasSubstr("look like milliseconds"));
+  const ToolRun read = run_tool("ammeter " + in + " --cell table9 --json " + path("a.json"));
+  EXPECT_EQ(read.exit_code, 2);
+  EXPECT_THAT(read.err, HasSubstr("--unit time_s=ms"));
   EXPECT_EQ(files(), 1U);
 }
 
