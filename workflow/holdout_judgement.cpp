@@ -1,9 +1,15 @@
 #include "workflow/holdout_judgement.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
 #include <fmt/format.h>
+#include <Eigen/Core>
 
 #include "diagnosis/quantity_text.hpp"
 #include "diagnosis/texts.hpp"
+#include "identification/residuals.hpp"
 #include "workflow/next_steps.hpp"
 
 namespace bms::workflow {
@@ -11,6 +17,7 @@ namespace bms::workflow {
 namespace {
 
 constexpr double significant_increase = 1.05;  ///< of an error on the hold-outs, before a warning says so
+constexpr double false_alarms = 0.01;          ///< share of right predictions that may be called wrong
 
 using diagnosis::millivolts;
 
@@ -25,12 +32,21 @@ std::string consequence(const DiagnoseResult& r) {
   return "something is there that this recording does not show.";
 }
 
+/// Returns true if the prediction of a hold-out failed.
+bool is_beyond(const RecordingComparison& c, double noise_floor_v) {
+  if (!c.interval.coverage.is_beyond(noise_floor_v)) return false;
+  std::vector<double> errors;
+  for (std::size_t k = 0; k < c.interval.sigma_v.size(); ++k)
+    errors.push_back((c.record.voltage_v[k] - c.extended_v[k]) / c.interval.sigma_v[k]);
+  return probability_of(errors) < false_alarms;
+}
+
 void add_contradiction(const DiagnoseOptions& options, DiagnoseResult& r) {
   const diagnosis::Verdict verdict = r.diagnosis.verdict;
   if (!r.named() && !r.has_term() && verdict != diagnosis::Verdict::no_mismatch) return;  // nothing is stated of others
   const RecordingComparison* worst = nullptr;
   for (const RecordingComparison& c : r.holdouts) {
-    if (!c.interval.coverage.is_beyond(r.diagnosis.noise_floor_v)) continue;
+    if (!is_beyond(c, r.diagnosis.noise_floor_v)) continue;
     r.holdouts_beyond.push_back(c.record.name);
     if (worst == nullptr || c.interval.coverage.error_v() > worst->interval.coverage.error_v()) worst = &c;
   }
@@ -73,6 +89,18 @@ void add_soc_increase(DiagnoseResult& r) {
 }
 
 }  // namespace
+
+double probability_of(std::span<const double> errors) {
+  const Eigen::VectorXd known = identification::without_missing(
+      Eigen::Map<const Eigen::VectorXd>(errors.data(), static_cast<Eigen::Index>(errors.size())));
+  if (known.size() == 0) return 1;
+  const auto rows = static_cast<double>(known.size());
+  const double independent = std::max(1.0, rows / identification::correlation_length(known));
+  // the cube root of chi square over its degrees of freedom is nearly normal (Wilson and Hilferty 1931)
+  const double variance = 2 / (9 * independent),
+               away = (std::cbrt(known.squaredNorm() / rows) - (1 - variance)) / std::sqrt(variance);
+  return std::erfc(away / std::sqrt(2)) / 2;
+}
 
 void judge_holdouts(const DiagnoseOptions& options, DiagnoseResult& r) {
   add_contradiction(options, r);
