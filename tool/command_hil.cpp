@@ -135,11 +135,17 @@ std::string report_of(const HilOptions& options, const hil::SessionPlan& plan, c
   return reports::page_of(page);
 }
 
+/// Whether the contactors closed; if not, the fault that came first.
+std::string contactors_text(const hil::SessionResult& r) {
+  if (r.driving_after_s) return fmt::format("contactors closed after {:.1f} s", *r.driving_after_s);
+  if (r.faults.empty()) return "contactors never closed";
+  return fmt::format("contactors never closed; the first fault was {} at {:.1f} s", r.faults.front().name,
+                     r.faults.front().raised_at_s);
+}
+
 std::string statement_of(const hil::SessionResult& r) {
-  std::string text = fmt::format("{:.2f} h in the loop, {:.0f} times real time: {} samples, {} frames",
-                                 r.duration_s / 3'600, r.speedup, r.samples, r.frames);
-  text += r.driving_after_s ? fmt::format(", contactors closed after {:.1f} s. ", *r.driving_after_s)
-                            : ", contactors never closed. ";
+  std::string text = fmt::format("{:.2f} h in the loop, {:.0f} times real time: {} samples, {} frames, {}. ",
+                                 r.duration_s / 3'600, r.speedup, r.samples, r.frames, contactors_text(r));
   text += fmt::format(
       "Error of the published state of charge: {:.2f} % RMS, {:.2f} % at most; the true value is within two sigma for "
       "{:.1f} % of the time.",
@@ -152,13 +158,29 @@ std::string statement_of(const hil::SessionResult& r) {
   }
   std::size_t missed = 0;
   for (const hil::InjectionResult& x : r.injection_results) missed += x.in_time ? 0 : 1;
-  if (!r.injection_results.empty() && missed == 0) text += " The board reported every injected fault in time.";
+  if (!r.injection_results.empty() && missed == 0) {
+    text += fmt::format(" The board reported every injected fault in time{}.",
+                        r.driving_after_s ? "" : ", with its contactors open");
+  }
   if (missed > 0) {
     text +=
         fmt::format(" The board did not report {} of {} injected faults in time.", missed, r.injection_results.size());
   }
   if (r.soc_wrong > 0) text += fmt::format(" It published a wrong state of charge as valid {} times.", r.soc_wrong);
   return text;
+}
+
+/// Samples that are too far apart for the board: it publishes SamplesMissing (protection/table.hpp) and never drives.
+void check_sample_period(const HilOptions& options, measurement::Recording& profile) {
+  constexpr double missing_after_periods = 5;
+  const double board_s = std::stod(images::board_setting(options.board, "BMS_SAMPLE_PERIOD_S"));
+  if (options.sample_period_s <= missing_after_periods * board_s) return;
+  profile.warnings.push_back(
+      {"sample_period",
+       fmt::format(
+           "a sample every {:g} s, but {} is built for one every {:g} s: for the board samples are missing, and "
+           "its contactors stay open, expected --sample-s {:g}",
+           options.sample_period_s, options.board, board_s, board_s)});
 }
 
 hil::SessionPlan read(const HilOptions& options) {
@@ -172,6 +194,7 @@ hil::SessionPlan read(const HilOptions& options) {
       input, plan.replayed ? files::VoltageColumn::required : files::VoltageColumn::optional, options.reading);
   print_read_as(options.output, plan.profile);
   measurement::compare_with_cell(plan.profile, plan.cell.parameters);
+  check_sample_period(options, plan.profile);
   for (const measurement::Warning& w : plan.profile.warnings) warn(input + ": " + w.text);
   plan.cells = options.cells != 0 ? options.cells : images::board_cells(options.board);
   plan.initial_soc = options.initial_soc;

@@ -13,6 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 double load_a(int second) {
   if (second % 60 < 30) return -5.0;
@@ -109,6 +110,15 @@ TEST_F(Hil, AFaultThatIsNotReportedGivesExitCode1) {
   const auto r = loop("--fault welded@60 --fault cell_open=2@299.9-299.95");
   EXPECT_EQ(r.exit_code, 1);
   EXPECT_THAT(r.err, HasSubstr("cell_open=2@299.9-299.95: expected VoltageMissing"));
+}
+
+TEST_F(Hil, SamplesThatAreTooFarApartForTheBoardAreAWarning) {
+  const std::string more = " --profile " + shift + " --fault nonsense@1";  // ends before the firmware runs
+  const auto apart = run_tool("hil --board stm32f405_forklift --sample-s 1" + more);
+  EXPECT_EQ(apart.exit_code, 2);
+  EXPECT_THAT(apart.err, HasSubstr("a sample every 1 s, but stm32f405_forklift is built for one every 0.1 s"));
+  EXPECT_THAT(run_tool("hil --board stm32f405_forklift" + more).err, Not(HasSubstr("a sample every")));
+  EXPECT_THAT(run_tool("hil --board netduinoplus2 --sample-s 1" + more).err, Not(HasSubstr("a sample every")));
 }
 
 TEST_F(Hil, ARecordedCurrentFlowsOnlyThroughClosedContactors) {
