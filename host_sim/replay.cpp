@@ -225,7 +225,9 @@ void write_trace(const ReplayResult& result, const files::Sink& sink) {
   for (const std::string& name : names) csv += name + ",";
   csv += "flags\n";
   const auto number = [&](double value) {
-    if (result.scalar == ScalarKind::float32)
+    if (!std::isfinite(value))
+      csv += ",";  // missing
+    else if (result.scalar == ScalarKind::float32)
       fmt::format_to(std::back_inserter(csv), "{},", static_cast<float>(value));
     else
       fmt::format_to(std::back_inserter(csv), "{},", value);
@@ -234,7 +236,9 @@ void write_trace(const ReplayResult& result, const files::Sink& sink) {
     const EstimateRow e = result.track.rows[k];
     fmt::format_to(std::back_inserter(csv), "{},", result.recording.time_s[k]);
     for (const double value : {e.soc, e.soc_sigma, e.v_rc_v, e.voltage_predicted_v}) number(value);
-    fmt::format_to(std::back_inserter(csv), "{},", result.recording.voltage_v[k]);
+    if (const double measured_v = result.recording.voltage_v[k]; std::isfinite(measured_v))
+      fmt::format_to(std::back_inserter(csv), "{}", measured_v);
+    csv += ",";
     for (std::size_t i = 0; i < names.size(); ++i) number(result.track.state(k, i));
     fmt::format_to(std::back_inserter(csv), "{}\n", e.flags);
     if (csv.size() < piece_bytes) continue;

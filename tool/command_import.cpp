@@ -1,5 +1,6 @@
 // bms import: a log of a tester, a logger or a CAN bus as a recording.
-#include <algorithm>
+#include <cmath>
+#include <string_view>
 
 #include <fmt/format.h>
 
@@ -54,14 +55,17 @@ class ImportCommand final : public Command {
 
  private:
   std::string summary(const measurement::Recording& r) const {
-    const auto ends = [](const measurement::Column& c) { return std::minmax_element(c.begin(), c.end()); };
-    const auto [low_a, high_a] = ends(r.current_a);
-    std::string text =
-        fmt::format("{} rows, {:.2f} h, {:g} to {:g} A", r.rows(), r.duration_s() / 3'600, *low_a, *high_a);
-    if (!r.voltage_v.empty()) {
-      const auto [low_v, high_v] = ends(r.voltage_v);
-      text += fmt::format(", {:g} to {:g} V", *low_v, *high_v);
-    }
+    const auto range = [](const measurement::Column& column, std::string_view unit) {
+      double low = std::nan(""), high = low;
+      for (const double value : column) {  // of a missing reading the other one
+        low = std::fmin(low, value);
+        high = std::fmax(high, value);
+      }
+      return std::isnan(low) ? fmt::format(", no reading in {}", unit)
+                             : fmt::format(", {:g} to {:g} {}", low, high, unit);
+    };
+    std::string text = fmt::format("{} rows, {:.2f} h{}", r.rows(), r.duration_s() / 3'600, range(r.current_a, "A"));
+    if (!r.voltage_v.empty()) text += range(r.voltage_v, "V");
     if (!r.cell_voltage_v.empty()) text += fmt::format(", {} cells", r.cell_voltage_v.size());
     return text + (out_.empty() ? ". Nothing was written: name a file with --out." : ": " + out_);
   }

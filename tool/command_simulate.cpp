@@ -202,13 +202,14 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
   if (run.interval) csv += ",voltage_std_v";
   csv += ",soc_ref\n";
   csv.reserve(run.rows.size() * 48);
+  const auto reading = [](double value) { return std::isfinite(value) ? fmt::format("{}", value) : ""; };
   for (std::size_t k = 0; k < run.rows.size(); ++k) {
     const double current_a = r.current_a[k] + options.noise_a * noise.next();
     const double voltage_v = run.rows[k].voltage_v + options.noise_v * noise.next();
     // ten digits: far below a microvolt and a microampere
     fmt::format_to(std::back_inserter(csv), "{},{:.10g},{:.10g},{:.10g}", r.time_s[k], current_a, voltage_v,
                    run.rows[k].soc);
-    if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", r.temperature_c[k]);
+    if (temperature) fmt::format_to(std::back_inserter(csv), ",{}", reading(r.temperature_c[k]));
     for (const SimulatedCell& cell : run.cells)
       fmt::format_to(std::back_inserter(csv), ",{:.10g}", cell.voltage_v[k] + options.noise_v * noise.next());
     if (run.interval) fmt::format_to(std::back_inserter(csv), ",{:.4g}", run.interval->sigma_v[k]);
