@@ -1,7 +1,7 @@
 // Draws the page from `report` (reports/diagnosis_page.cpp): pictures as SVG, curves over time with dygraphs.
 (() => {
   'use strict';
-  const {get, make, draw, svg, hint, signs, percent, mv, clock, red, blue, green, dark, grey} = drawing;
+  const {get, make, draw, svg, hint, signs, percent, mv, red, blue, green, dark, grey} = drawing;
   const amber = '#a86a00', orange = '#e39a3b', pale_blue = '#7fa8cf', dashed = '3 2';
   const verdicts = {
     NO_MISMATCH: green,
@@ -39,10 +39,9 @@
 
   /// One bar: {name, hint, value, zero, low, high, text, colour, strong}; places are 0..1.
   const draw_bar = (s, r, x, y, options) => {
-    const {left, room, width} = options;
-    hint(
-        draw(s, 'text', {x: 0, y: y + 4, class: r.strong ? 'strong' : ''}, cut(r.name, left - 6)),
-        r.name + (r.hint ? ': ' + r.hint : ''));
+    const {left, room, width, stacked} = options;
+    const name = {x: 0, y: stacked ? y - 9 : y + 4, class: r.strong ? 'strong' : ''};
+    hint(draw(s, 'text', name, cut(r.name, stacked ? width : left - 6)), r.name + (r.hint ? ': ' + r.hint : ''));
     draw(s, 'rect', {x: left, y: y - 5, width: room, height: 10, fill: drawing.colour('head')});
     if (r.value !== null) {
       const from = x(r.zero || 0), to = x(r.value);
@@ -57,15 +56,16 @@
     }
     draw(s, 'text', {x: width, y: y + 4, class: 'end'}, r.text);
   };
-  /// options: {left, right: margins; each: height of a row; foot: space below}
-  const bars = (box, rows, {left: least, right, each = 20, foot = 0}) => {
+  /// options: {left, right: margins; each: height of a row}. Names that would leave no room for the bars stand above
+  /// them.
+  const bars = (box, rows, {left: least, right, each = 20}) => {
     const width = Math.max(240, box.clientWidth), longest = Math.max(0, ...rows.map(r => r.name.length));
-    const left = Math.max(least, Math.min(6.1 * longest + 12, width - right - 90));  // so that no name is cut
-    const room = width - left - right;
-    const s = svg(box, width, rows.length * each + foot);
+    const names = 6.1 * longest + 12, most = width - right - 60, stacked = names > most;
+    const left = stacked ? 0 : Math.min(most, Math.max(least, names)), room = width - left - right;
+    const high = stacked ? each + 13 : each, s = svg(box, width, rows.length * high);
     const x = v => left + room * Math.max(0, Math.min(1, v));
-    rows.forEach((r, k) => draw_bar(s, r, x, k * each + each / 2, {left, room, width}));
-    return {s, x, width, height: rows.length * each};
+    rows.forEach((r, k) => draw_bar(s, r, x, (k + 1) * high - each / 2, {left, room, width, stacked}));
+    return {s, x, width, height: rows.length * high};
   };
   const limit_row = l => ({
     name: title_of(l.name),
@@ -200,22 +200,20 @@
   };
   const draw_candidates = box => {
     const list = report.candidates.slice(0, 6), first = list[0], best = Math.max(1.25 * report.detected, first.gain);
-    const names = 12 + 6.1 * Math.max(...list.map(c => c.name.length));
-    const left = Math.min(0.55 * box.clientWidth, Math.max(120, names));
     const rows = list.map((c, k) => candidate_row(c, k, first, best));
-    const b = bars(box, rows, {left: left, right: 84, each: 19, foot: 17});
+    const b = bars(box, rows, {left: 120, right: 84, each: 19});
     const limit_x = b.x(report.detected / best);
-    const line = (colour, text, anchor) => {
+    const line = (colour, text) => {
       const style = {stroke: colour, 'stroke-dasharray': dashed};
       draw(b.s, 'line', Object.assign({x1: limit_x, x2: limit_x, y1: 0, y2: b.height}, style));
-      draw(b.s, 'text', {x: limit_x, y: b.height + 12, class: anchor}, text);
+      make(box, 'p', text, 'why');
     };
-    if (!report.named) return line(red, 'threshold of significance', limit_x < 170 ? '' : 'end');
+    if (!report.named) return line(red, 'Dashed: threshold of significance.');
     const from = b.x(Math.max(0, first.gain - report.tie) / best), to = b.x(first.gain / best);
     const area = {x: Math.min(from, to - 3), y: 0, width: Math.max(3, to - from), height: b.height};
     const band = draw(b.s, 'rect', Object.assign(area, {fill: '#e0a100', 'fill-opacity': 0.4}));
     hint(band, `within ${report.tie} of the best: not distinguishable`);
-    line(grey, 'threshold; yellow: not distinguishable', '');
+    line(grey, 'Dashed: threshold of significance. Yellow: not distinguishable from the best.');
   };
   const draw_reasons = () => {
     const box = get('why');
@@ -237,7 +235,7 @@
 
   const floor_text = report.floor_mv > 0 ? '; a healthy cell causes up to ' + mv(report.floor_mv) : '';
   const draw_share = box => {
-    const width = Math.max(240, box.clientWidth), s = svg(box, width, 42);
+    const width = Math.max(240, box.clientWidth), s = svg(box, width, 18);
     const explained = report.named ? Math.max(0, Math.min(1, report.unexplained.explained)) : 0;
     draw(s, 'rect', {x: 0, y: 0, width: width, height: 18, fill: '#e9b9bf'});
     draw(s, 'rect', {x: 0, y: 0, width: width * explained, height: 18, fill: blue});
@@ -247,7 +245,7 @@
     if (explained < 0.75) draw(s, 'text', {x: width - 6, y: 13, class: 'end'}, open);
     const residual = mv(report.unexplained.rmse_mv) + ' RMS unexplained; a healthy cell causes up to ';
     const adjusted = 'Start and zero of the current sensor adjusted to these recordings, within their tolerance';
-    hint(draw(s, 'text', {x: 0, y: 35}, residual + mv(report.floor_mv) + '.'), adjusted);
+    make(box, 'p', residual + mv(report.floor_mv) + '.', 'why').title = adjusted;
   };
   const draw_unexplained = () => {
     const box = get('unexplained'), next = report.next, judged = report.limits.length;
@@ -314,11 +312,11 @@
       colors: columns.map(column => column.colour),
       axisLabelFontSize: 12,
       gridLineColor: drawing.faint,
-      xlabel: 'time, h:mm',
+      xlabel: drawing.time_title(rows[0][0], rows[rows.length - 1][0]),
       xLabelHeight: 15,
       strokeWidth: 1.2,
       digitsAfterDecimal: 4,
-      axes: {x: {axisLabelFormatter: clock, valueFormatter: clock}, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
+      axes: {x: drawing.time_axis, y: {axisLabelWidth: 58, pixelsPerLabel: 24}},
     });
   };
   const draw_curves = () => {

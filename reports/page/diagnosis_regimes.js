@@ -2,14 +2,14 @@
 const regimes = (() => {
   'use strict';
   const {make, draw, svg, hint, percent, mv, ticks, red, blue, grey} = drawing;
-  const sand = drawing.colour('sand'), high = 104, left = 30, top = 18, bottom = top + high;
+  const sand = drawing.colour('sand'), high = 104, left = 30, top = 34, bottom = top + high;
 
   /// Marks the range with most of the mismatch.
-  const mark_found = (s, found, x, width) => {
+  const mark_found = (s, found, x) => {
     const text = ' in ' + percent(found.usual) + ' of the time';
     const area = {x: x(found.from), y: top, width: Math.max(2, x(found.to) - x(found.from)), height: high, fill: sand};
     hint(draw(s, 'rect', area), percent(found.share) + ' of the mismatch' + text);
-    draw(s, 'text', {x: width, y: 11, class: 'end'}, percent(found.share) + ' of it' + text);
+    draw(s, 'text', {x: left, y: 27}, 'shaded: ' + percent(found.share) + ' of it' + text);
   };
 
   /// Bars of both models; the more time, the more solid.
@@ -36,7 +36,7 @@ const regimes = (() => {
     const most = Math.max(1, ...axis.before_mv.concat(axis.after_mv).filter(Number.isFinite));
     const x = v => left + room * (v - axis.low) / (axis.high - axis.low), y = v => bottom - high * v / most;
     draw(s, 'text', {x: 0, y: 11, class: 'strong'}, axis.title + ', ' + axis.unit);
-    if (axis.found) mark_found(s, axis.found, x, width);
+    if (axis.found) mark_found(s, axis.found, x);
     error_bars(s, axis, y, room / axis.before_mv.length);
     draw(s, 'line', {x1: left, x2: width - 4, y1: bottom, y2: bottom, stroke: grey});
     for (const t of ticks(0, most, 3)) draw(s, 'text', {x: left - 4, y: y(t) + 4, class: 'end'}, t);

@@ -33,11 +33,28 @@ const drawing = (() => {
     if (v < 1) return v.toFixed(2) + ' mV';
     return v.toFixed(v < 100 ? 1 : 0) + ' mV';
   };
-  /// Hours as h:mm or h:mm:ss.
-  const clock = h => {
+  /// Hours as h:mm, or as h:mm:ss if there are seconds or they are asked for.
+  const clock = (h, seconds) => {
     const s = Math.round(h * 3600), two = n => String(n).padStart(2, '0');
-    return Math.floor(s / 3600) + ':' + two(Math.floor(s / 60) % 60) + (s % 60 ? ':' + two(s % 60) : '');
+    const more = s % 60 || seconds === true ? ':' + two(s % 60) : '';
+    return Math.floor(s / 3600) + ':' + two(Math.floor(s / 60) % 60) + more;
   };
+  /// Step of a time axis in s, for `room` labels: of whole seconds, minutes, hours or days.
+  const time_step = (range_s, room) => {
+    const steps = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400];
+    return steps.find(s => range_s / s <= room) || 86400 * Math.ceil(range_s / room / 86400);
+  };
+  /// Ticks of a time axis in hours at round times, all labels in one format. A `ticker` of Dygraph.
+  const time_ticks = (from, to, pixels) => {
+    const step = time_step(3600 * (to - from), Math.max(2, Math.floor(pixels / 70))), all = [];
+    for (let k = Math.ceil(3600 * from / step - 1e-6); k * step <= 3600 * to + 1e-6; ++k)
+      all.push({v: k * step / 3600, label: clock(k * step / 3600, step < 60)});
+    return all;
+  };
+  /// The x axis of a chart over hours: options of Dygraph.
+  const time_axis = {ticker: time_ticks, valueFormatter: h => clock(h)};
+  /// Its title. from, to: hours.
+  const time_title = (from, to) => time_step(3600 * (to - from), 8) < 60 ? 'time, h:mm:ss' : 'time, h:mm';
   const colour = name => getComputedStyle(document.documentElement).getPropertyValue('--' + name).trim();
   /// Lists the warnings in an element. Those that differ only in their numbers are shown once.
   const warnings = (element, texts) => {
@@ -71,10 +88,10 @@ const drawing = (() => {
   };
   /// A chart over the time in hours, or over `x` if it is given. more: options of Dygraph.
   const chart = (div, labels, rows, legend, more = {}) => {
-    const time = {axisLabelFormatter: clock, valueFormatter: clock};
+    const last = rows.length - 1;
     return new Dygraph(div, rows, {
       labels: [more.x || 'time', ...labels],
-      xlabel: more.x || 'time, h:mm or h:mm:ss',
+      xlabel: more.x || (rows.length ? time_title(rows[0][0], rows[last][0]) : 'time, h:mm'),
       xLabelHeight: 15,
       labelsDiv: legend,
       legend: 'always',
@@ -85,7 +102,7 @@ const drawing = (() => {
       strokeWidth: 1.3,
       fillAlpha: 0.22,
       ...more,
-      axes: {x: more.x ? {} : time, y: {axisLabelWidth: 58, pixelsPerLabel: 24}, ...more.axes},
+      axes: {x: more.x ? {} : time_axis, y: {axisLabelWidth: 58, pixelsPerLabel: 24}, ...more.axes},
     });
   };
   /// Charts of a printed page are as wide as the paper.
@@ -106,6 +123,8 @@ const drawing = (() => {
     percent,
     mv,
     clock,
+    time_axis,
+    time_title,
     colour,
     warnings,
     chart,

@@ -120,6 +120,7 @@
     const top = Math.max(0, Math.floor(get('recordings').scrollTop / row_px) - 2), rows = get('rows');
     rows.textContent = '';
     rows.style.top = top * row_px + 'px';
+    get('titles').style.width = get('recordings').clientWidth + 'px';  // less the scroll bar
     for (const k of listed.slice(top, top + shown_rows)) {
       const row = rows.insertRow(), name = make(row, 'td'), page = page_of(k), text = cell_name(all.cell[k]);
       if (page)
@@ -142,5 +143,6 @@
   };
   get('only').addEventListener('change', list);
   get('recordings').addEventListener('scroll', fill);
+  window.addEventListener('resize', fill);
   list();
 })();

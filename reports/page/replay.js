@@ -1,7 +1,7 @@
 // Draws the page from `report`: {title, statement, warnings, figures: [[name, value] | [group]], columns: {...}}.
 (() => {
   'use strict';
-  const {clock, colour, get, warnings} = drawing;
+  const {colour, get, warnings} = drawing;
   document.getElementById('title').textContent = report.title;
   document.getElementById('statement').textContent = report.statement;
   warnings(get('warnings'), report.warnings);
@@ -27,7 +27,7 @@
       drawing.chart(get('chart-' + name), labels, data, get('legend-' + name), options);
 
   const in_percent = {
-    x: {axisLabelFormatter: clock, valueFormatter: clock},
+    x: drawing.time_axis,
     y: {axisLabelWidth: 58, pixelsPerLabel: 24, valueFormatter: v => v.toFixed(2)}
   };
   // a range that a wrong initial estimate does not widen: at most 1.5 times that of 99.5 % of the values

@@ -3,24 +3,28 @@
 // labels on an axis of their own.
 (() => {
   'use strict';
-  const {make, get, chart, warnings} = drawing;
+  const {make, get, chart, warnings, signs} = drawing;
   document.getElementById('title').textContent = report.title;
-  document.getElementById('statement').textContent = report.statement;
+  document.getElementById('statement').textContent = signs(report.statement);
   warnings(get('warnings'), report.warnings);
   const sections = document.getElementById('sections');
   window.charts = [];
   for (const section of report.sections) {
     const box = make(sections, 'figure');
-    const caption = make(box, 'figcaption', section.title + ' ');
+    const caption = make(box, 'figcaption', signs(section.title) + ' ');
     if (section.table) {
       const table = make(box, 'table', undefined, 'wide');
       const head = table.insertRow();
       head.className = 'group';
-      for (const name of section.table.head) make(head, 'td', name);
+      const is_words = cell => /[a-z]{4}/.test(cell.text);
+      section.table.head.forEach((name, k) => {  // a title stands where the texts of its column begin
+        const words = section.table.rows.some(row => row[k] && is_words(row[k]));
+        make(head, 'td', signs(name), words ? 'words' : undefined);
+      });
       for (const row of section.table.rows) {
         const tr = table.insertRow();
         for (const cell of row) {
-          const td = make(tr, 'td', cell.text, /[a-z]{4}/.test(cell.text) ? 'words' : undefined);
+          const td = make(tr, 'td', signs(cell.text), is_words(cell) ? 'words' : undefined);
           if (cell.paper !== undefined) make(td, 'span', ' paper ' + cell.paper, 'paper');
         }
       }

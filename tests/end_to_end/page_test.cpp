@@ -10,20 +10,29 @@ namespace {
 using ::testing::HasSubstr;
 
 /// The page's document after its scripts ran, as the browser serialises it. Script errors are appended to it.
-std::string document_of(const std::filesystem::path& page, const std::filesystem::path& folder) {
+/// width: of the window, 500 or more.
+std::string document_of(const std::filesystem::path& page, const std::filesystem::path& folder, int width = 1400) {
   std::string html = content(page);
   const std::string listener =
       "<script>const complain = text => { const p = document.createElement('p'); p.textContent = 'SCRIPT ERROR ' + "
       "text; document.documentElement.appendChild(p); };"
       "window.addEventListener('error', e => complain(e.message));"
-      "document.addEventListener('securitypolicyviolation', e => complain(e.violatedDirective));</script>";
+      "document.addEventListener('securitypolicyviolation', e => complain(e.violatedDirective));"
+      // texts of the pictures: whole, and inside of their cards
+      "window.addEventListener('load', () => document.querySelectorAll('figure svg text').forEach(t => {"
+      "const own = t.getBoundingClientRect(), card = t.closest('figure').getBoundingClientRect();"
+      "const text = t.firstChild ? t.firstChild.textContent : '';"
+      "if (own.left < card.left - 1 || own.right > card.right + 1 || text.endsWith('\\u2026')) complain('cut: ' + "
+      "text);"
+      "}));</script>";
   html.insert(html.find("<meta http-equiv"), listener);  // the page's policy applies to what follows
   const auto watched = folder / "watched.html", out = folder / "dom";
   std::ofstream(watched) << html;
   const std::string command =
       "chromium --headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
-      "--disable-component-update --disable-sync --window-size=1400,1100 --virtual-time-budget=5000 --user-data-dir=" +
-      (folder / "profile").string() + " --dump-dom file://" + watched.string() + " > " + out.string() + " 2>/dev/null";
+      "--disable-component-update --disable-sync --window-size=" +
+      std::to_string(width) + ",1100 --virtual-time-budget=5000 --user-data-dir=" + (folder / "profile").string() +
+      " --dump-dom file://" + watched.string() + " > " + out.string() + " 2>/dev/null";
   EXPECT_EQ(std::system(command.c_str()), 0);
   return content(out);
 }
@@ -116,6 +125,8 @@ TEST(DiagnosisPage, ShowsTheDetectionLimitsWithoutAMismatch) {
   EXPECT_THAT(dom, HasSubstr("NO MISMATCH"));
   EXPECT_THAT(dom, HasSubstr("threshold of significance"));
   EXPECT_GE(count(dom, "<canvas"), 4U);
+  const std::string narrow = document_of(folder.path() / "report.html", folder.path(), 500);
+  EXPECT_EQ(count(narrow, "SCRIPT ERROR"), 1U) << "cut: " << narrow.substr(narrow.rfind("SCRIPT ERROR"), 100);
 }
 
 }  // namespace
