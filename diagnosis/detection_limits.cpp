@@ -70,4 +70,18 @@ std::vector<DetectionLimit> limits_of(const std::vector<StrengthSigma>& sigmas, 
   return all;
 }
 
+std::vector<std::size_t> not_visible(const Diagnosis& d) {
+  std::vector<std::size_t> hidden;
+  if (d.verdict == Verdict::data_fault || d.verdict == Verdict::unfinished) return hidden;
+  const auto has = [](const auto& list, std::size_t m) {
+    return std::any_of(list.begin(), list.end(), [m](const auto& entry) { return entry.mechanism == m; });
+  };
+  for (std::size_t m = 0; m < model::mechanism_count; ++m) {
+    const MechanismKnowledge& knowledge = knowledge_of(m);
+    if (knowledge.only_a_term || knowledge.signature == Signature::contact_bursts) continue;
+    if (d.extended.find(m) == nullptr && !has(d.not_testable, m) && !has(d.limits, m)) hidden.push_back(m);
+  }
+  return hidden;
+}
+
 }  // namespace bms::diagnosis

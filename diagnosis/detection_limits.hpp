@@ -40,4 +40,9 @@ using GainOfSize = std::function<double(const StrengthSigma& mechanism, double s
 std::vector<DetectionLimit> limits_of(const std::vector<StrengthSigma>& sigmas, const ResidualTest& left,
                                       double capacity_ah, const HealthyGain& healthy, const GainOfSize& gain = {});
 
+/// Mechanisms that were tested and are not found, and that these recordings would hardly show at any possible size:
+/// they have no limit. Empty if nothing was tested to the end. A loose contact, which is searched and not projected, is
+/// never among them.
+std::vector<std::size_t> not_visible(const Diagnosis& d);
+
 }  // namespace bms::diagnosis

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "diagnosis/detection_limits.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "diagnosis/withheld_text.hpp"
 #include "measurement/statistics.hpp"
@@ -114,11 +115,20 @@ std::string relevant_facts(std::size_t a, std::size_t b, const RecordingFacts& f
   return parts.empty() ? "" : " In this recording " + joined(parts, "and") + ".";
 }
 
+/// Causes that no possible size would show. Next to healthy recordings it is these that hide a cause.
+std::string not_visible_text(const Diagnosis& d) {
+  std::vector<std::string> names;
+  for (const std::size_t m : d.healthy ? std::vector<std::size_t>() : not_visible(d)) {
+    if (knowledge_of(m).report_limit) names.emplace_back(text_of_mechanism(m).name);
+  }
+  return names.empty() ? "" : " Not visible in this recording: " + joined(names, "and") + ".";
+}
+
 std::string no_mismatch_text(const Diagnosis& d, const RecordingFacts& facts) {
   const std::string limits = telling_limits(d, facts);
-  return fmt::format("The cell file reproduces the recording to {}, which is within its tolerance.{} {}",
-                     millivolts(facts.error_v),
-                     limits.empty() ? "" : " The recording would have revealed " + limits + ".", no_action);
+  return fmt::format(
+      "The cell file reproduces the recording to {}, which is within its tolerance.{}{} {}", millivolts(facts.error_v),
+      limits.empty() ? "" : " The recording would have revealed " + limits + ".", not_visible_text(d), no_action);
 }
 
 std::string cause_text(const Diagnosis& d, const RecordingFacts& facts) {

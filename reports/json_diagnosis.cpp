@@ -1,3 +1,4 @@
+#include "diagnosis/detection_limits.hpp"
 #include "diagnosis/texts.hpp"
 #include "diagnosis/withheld_text.hpp"
 #include "reports/detectability.hpp"
@@ -277,6 +278,7 @@ std::string json_of(const workflow::DiagnoseResult& r) {
                                                   {"parameters", parameters_of(*d.law->mechanism)}}
                                            : Json(nullptr);
   json["detection_limits"] = limits_of(d);
+  json["not_visible"] = ids_of(diagnosis::not_visible(d));
   json["isolability"] = isolability_json(d);
   json["estimates"] = estimates_of(d);
   json["resistances"] = d.resistances ? Json{{"temperature_c", number(d.resistances->temperature_c)},

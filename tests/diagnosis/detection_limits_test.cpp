@@ -15,9 +15,11 @@
 namespace bms::diagnosis {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
-constexpr std::size_t offset = model::mechanism_index_of<model::VoltageOffset>;
+constexpr std::size_t offset = model::mechanism_index_of<model::VoltageOffset>,
+                      leakage = model::mechanism_index_of<model::Leakage>;
 
 ResidualTest leaves(double gain) {
   ResidualTest left;
@@ -34,6 +36,20 @@ TEST(DetectionLimits, AskForWhatTheDecisionAsksFor) {
   EXPECT_NEAR(limit_of_offset(0), 0.001 * (std::sqrt(26) + 1.28), 1e-6);
   EXPECT_NEAR(limit_of_offset(10), 0.001 * (std::sqrt(40) + 1.28), 1e-6) << "four fifths of the misfit";
   EXPECT_NEAR(limit_of_offset(1e4), 0.001 * (std::sqrt(52) + 1.28), 1e-6) << "not faint any more";
+}
+
+TEST(DetectionLimits, WhatWasTestedAndHasNoLimitIsNotVisible) {
+  const std::vector<DetectionLimit> limits = limits_of({{offset, 0.001}, {leakage, 10}}, leaves(0), 6, {});
+  ASSERT_EQ(limits.size(), 1U) << "no cell leaks 60 A";
+  Diagnosis d;
+  d.verdict = Verdict::no_mismatch;
+  d.limits = limits;
+  for (std::size_t m = 0; m < model::mechanism_count; ++m) {
+    if (m != offset && m != leakage) d.not_testable.push_back({m, "too short"});
+  }
+  EXPECT_THAT(not_visible(d), ElementsAre(leakage));
+  d.verdict = Verdict::data_fault;
+  EXPECT_THAT(not_visible(d), IsEmpty());
 }
 
 TEST(DetectionLimits, WithHealthyRecordingsASizeStandsOutFromThem) {
