@@ -7,7 +7,6 @@ Runs the commands on input that is valid and says little: a constant current, re
 single temperature. An error of one line with exit status 1 or 2 is an answer as well. Exit status 1 if an output has
 such a number."""
 import json
-import math
 import os
 import pathlib
 import re
