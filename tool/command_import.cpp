@@ -12,6 +12,7 @@
 #include "reports/json_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "tool/recording_part.hpp"
 
 namespace bms::tool {
 
@@ -29,6 +30,7 @@ class ImportCommand final : public Command {
         ->type_name("FILE");
     c.add_option("--cell", cell_, cell_help("compare the readings with this cell"));
     c.add_flag("--profile", profile_, "a current profile without a voltage");
+    add_part(c, part_);
     add_reading(c, reading_);
     add_json(c, output_);
     return &c;
@@ -42,6 +44,7 @@ class ImportCommand final : public Command {
     measurement::Recording recording = files::read_recording(
         file_, profile_ ? files::VoltageColumn::optional : files::VoltageColumn::required, reading_);
     print_read_as(output_, recording);
+    cut(part_, recording);
     if (!cell_.empty()) {
       measurement::compare_with_cell(recording, files::read_cell(cell_).parameters);
       refuse_contradiction(recording);
@@ -73,6 +76,7 @@ class ImportCommand final : public Command {
   std::string file_, out_, cell_;
   bool profile_ = false;
   files::ReadOptions reading_;
+  RecordingPart part_;
   Output output_;
 };
 

@@ -21,6 +21,7 @@
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/pack_cells.hpp"
+#include "tool/recording_part.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace bms::tool {
@@ -38,6 +39,7 @@ struct SimulateOptions {
   bool interval = false;
   std::string out;
   files::ReadOptions reading;
+  RecordingPart part;
   Output output;
 
   const std::string& input() const { return recording.empty() ? profile : recording; }
@@ -115,6 +117,7 @@ SimulationRun read(const SimulateOptions& options) {
       options.input(), options.recording.empty() ? files::VoltageColumn::optional : files::VoltageColumn::required,
       options.reading);
   print_read_as(options.output, run.recording);
+  cut(options.part, run.recording);
   measurement::compare_with_cell(run.recording, run.cell.parameters);
   refuse_contradiction(run.recording);
   if (options.interval && !run.recording.cell_voltage_v.empty())
@@ -302,6 +305,7 @@ class SimulateCommand final : public Command {
          "commands read; of a pack also v_1 to v_N")
         ->required()
         ->type_name("FILE");
+    add_part(c, o_.part);
     add_reading(c, o_.reading);
     add_output(c, o_.output);
     return &c;

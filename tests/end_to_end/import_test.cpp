@@ -324,5 +324,27 @@ TEST_F(ImportFiles, APackIsSimulatedAndIdentifiedCellByCell) {
   EXPECT_THAT(content(path("my_cell2.toml")), HasSubstr("my_cell2"));
 }
 
+TEST_F(ImportFiles, CutsARecordingByTheTimeSinceItsFirstRow) {
+  std::string text = "time_s,current_a,voltage_v,note\n";
+  for (int k = 0; k <= 100; ++k) text += std::to_string(5'000 + k) + ",-1,3.3,n" + std::to_string(k) + "\n";
+  const std::string log = write("log.csv", text);
+  const ToolRun run = run_tool("import " + log + " --from 20 --until 60 --out " + path("part.csv"));
+  ASSERT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_THAT(run.out, HasSubstr("41 rows"));
+  const std::string part = content(path("part.csv"));
+  EXPECT_THAT(part, HasSubstr("5020,-1,3.3"));
+  EXPECT_THAT(part, HasSubstr("5060,-1,3.3"));
+  EXPECT_THAT(part, HasSubstr("n20"));
+  for (const char* outside : {"5019,", "5061,", "n19", "n61"}) EXPECT_THAT(part, Not(HasSubstr(outside)));
+  const ToolRun simulated =
+      run_tool("simulate --cell table9 --initial-soc 0.5 --recording " + log + " --until 30 --out " + path("s.csv"));
+  EXPECT_EQ(simulated.exit_code, 0) << simulated.err;
+  EXPECT_THAT(simulated.out, HasSubstr("31 rows"));
+  const ToolRun empty = run_tool("import " + log + " --from 95 --out " + path("none.csv"));
+  EXPECT_EQ(empty.exit_code, 2);
+  EXPECT_THAT(empty.err, HasSubstr("leaves 6 rows of 100 s, expected 10 or more"));
+  EXPECT_FALSE(std::filesystem::exists(path("none.csv")));
+}
+
 }  // namespace
 }  // namespace bms

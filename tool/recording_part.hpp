@@ -1,0 +1,23 @@
+// The options --from and --until: a part of a recording.
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "measurement/recording.hpp"
+
+namespace bms::tool {
+
+/// In s since the first row.
+struct RecordingPart {
+  double from_s = 0, until_s = 0;
+  CLI::Option* from = nullptr;
+  CLI::Option* until = nullptr;
+};
+
+/// --from and --until.
+void add_part(CLI::App& command, RecordingPart& part);
+
+/// Leaves the rows of that part. Throws BadInput if they are fewer than a recording has.
+void cut(const RecordingPart& part, measurement::Recording& recording);
+
+}  // namespace bms::tool
