@@ -2,12 +2,14 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "workflow/identify_cell.hpp"
+#include "workflow/recorded_pulses.hpp"
 
 namespace bms::reports {
 
 /// Parameters, goodness of fit and voltages, for the identification data and each validation recording.
-std::string identify_report(const workflow::IdentifyResult& result);
+std::string identify_report(const workflow::IdentifyResult& result,
+                            const std::vector<workflow::RecordedPulses>& pulses);
 
 }  // namespace bms::reports

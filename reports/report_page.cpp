@@ -11,6 +11,7 @@
 
 #include "files/text_file.hpp"
 #include "reports/embedded_files.hpp"
+#include "reports/page_order.hpp"
 
 namespace bms::reports {
 
@@ -298,12 +299,22 @@ std::string replay_report(const host_sim::ReplayResult& r) {
   return page(embedded::replay_html, embedded::replay_js, "bms replay", data(r));
 }
 
-std::string page_of(const files::PageContent& p) {
+namespace {
+
+std::string content_page(const files::PageContent& p, bool charts_first) {
   json content = {
       {"title", p.title}, {"statement", p.statement}, {"warnings", p.warnings}, {"sections", json::array()}};
-  for (const files::PageTable& t : p.tables) content["sections"].push_back(table_of(t));
-  for (const files::PageChart& c : p.charts) content["sections"].push_back(chart_of(c));
+  json &sections = content["sections"], charts = json::array();
+  for (const files::PageChart& c : p.charts) charts.push_back(chart_of(c));
+  for (const files::PageTable& t : p.tables) sections.push_back(table_of(t));
+  sections.insert(charts_first ? sections.begin() : sections.end(), charts.begin(), charts.end());
   return page(embedded::study_html, embedded::study_js, p.title, in_script(text_of(content)));
 }
+
+}  // namespace
+
+std::string page_of(const files::PageContent& p) { return content_page(p, false); }
+
+std::string page_with_charts_first(const files::PageContent& p) { return content_page(p, true); }
 
 }  // namespace bms::reports

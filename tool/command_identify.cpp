@@ -8,6 +8,7 @@
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "reports/identify_page.hpp"
+#include "reports/identify_tables.hpp"
 #include "reports/json_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
@@ -123,7 +124,11 @@ class IdentifyCommand final : public Command {
                                     "it the mean cell is identified");
     add_reading(c, o_.reading);
     add_output(c, output_);
-    each.excludes("--report")->excludes("--extend")->excludes("--healthy");
+    CLI::Option& csv =
+        *c.add_option("--csv", csv_, "folder for the tables as CSV: parameters, their correlations, pulse resistances")
+             ->check(not_empty())
+             ->type_name("FOLDER");
+    each.excludes(&csv)->excludes("--report")->excludes("--extend")->excludes("--healthy");
     return &c;
   }
 
@@ -198,10 +203,21 @@ class IdentifyCommand final : public Command {
       if (!output_.quiet) fmt::print(stderr, "{}\n", files::printable(text));
     }
     for (const measurement::Warning& w : result.warnings) warn(w.text);
-    if (!output_.json.empty()) write_output(output_.json, reports::json_of(result));
-    if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result));
+    const auto pulses = workflow::recorded_pulses(o_, result);
+    if (!output_.json.empty()) write_output(output_.json, reports::with_pulses(reports::json_of(result), pulses));
+    if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result, pulses));
+    if (!csv_.empty()) write_csv(result, pulses);
     print_summary(output_, summary(result, learns_unasked_));
     return result.cell_file ? 0 : 1;
+  }
+
+  void write_csv(const workflow::IdentifyResult& result, const std::vector<workflow::RecordedPulses>& pulses) const {
+    std::error_code error;
+    std::filesystem::create_directories(csv_, error);
+    if (error)
+      throw files::BadInput(csv_, 1, "cannot be created (" + error.message() + "), expected a folder to write to");
+    for (const reports::CsvFile& file : reports::identify_csv(result, pulses))
+      write_output((std::filesystem::path(csv_) / file.name).string(), file.text);
   }
 
   void add_inputs(CLI::App& c) {
@@ -310,6 +326,7 @@ class IdentifyCommand final : public Command {
   IdentifyTexts texts_;
   bool each_cell_ = false, no_healthy_ = false;
   bool learns_unasked_ = false;  ///< [healthy] from the recordings themselves
+  std::string csv_;
   Output output_;
 };
 

@@ -352,5 +352,42 @@ TEST_F(IdentifyTool, StudyAcceptsAFolderOfRecordings) {
   EXPECT_EQ(run_tool("study --recordings " + path("nowhere") + " --out " + path("out")).exit_code, 2);
 }
 
+/// Pulse test of a cell with known R0, R1, C1: what is read from its edges without a model, the correlations and the
+/// files of --csv.
+TEST_F(IdentifyTool, HasPulseResistancesCorrelationsAndTheirFiles) {
+  ASSERT_EQ(run_tool("experiment ocv_10min_rest --out " + path("p.csv")).exit_code, 0);
+  ASSERT_EQ(run_tool("simulate --cell table9 --profile " + path("p.csv") + " --initial-soc 1 --out " + path("s.csv"))
+                .exit_code,
+            0);
+  const json r = result("--recording " + path("s.csv") + " --window 0.8:0.3 --report " + path("r.html") + " --csv " +
+                        path("tables"));
+  const json& pulses = r["pulse_resistances"];
+  ASSERT_GT(pulses.size(), 5U);
+  double r0_ohm = 0;
+  for (const json& p : r["parameters"]) {
+    if (p["name"] == "r0_ohm" && std::abs(p["soc"].get<double>() - 0.5) < 0.06) r0_ohm = p["value"];
+  }
+  const json* middle = &pulses[0];
+  for (const json& p : pulses) {
+    if (std::abs(p["soc"].get<double>() - 0.5) < std::abs((*middle)["soc"].get<double>() - 0.5)) middle = &p;
+  }
+  EXPECT_EQ((*middle)["direction"], "discharge");
+  EXPECT_EQ((*middle)["at"][0]["after_s"], 1);
+  // after 1 s R0 and a little of R1; the longer, the more
+  EXPECT_NEAR((*middle)["at"][0]["resistance_ohm"].get<double>(), r0_ohm, 0.1 * r0_ohm);
+  EXPECT_GT((*middle)["at"][1]["resistance_ohm"], (*middle)["at"][0]["resistance_ohm"]);
+
+  EXPECT_THAT(content(path("tables/parameters.csv")), HasSubstr("name,soc,temperature_c,value,std"));
+  const std::string correlation = content(path("tables/correlation.csv"));
+  EXPECT_THAT(correlation, HasSubstr("parameter,r0_ohm at 0."));
+  EXPECT_THAT(content(path("tables/pulse_resistance.csv")), HasSubstr(",discharge,"));
+  const std::string page = content(path("r.html"));
+  EXPECT_THAT(page, HasSubstr("identified from s.csv"));
+  EXPECT_THAT(page, HasSubstr("The largest residual is"));
+  EXPECT_THAT(page, HasSubstr("Strongest correlations of the parameters"));
+  EXPECT_THAT(page, HasSubstr("time since the pulse began, s"));
+  EXPECT_LT(page.find("time since the pulse began, s"), page.find("\"Parameters\"")) << "charts before numbers";
+}
+
 }  // namespace
 }  // namespace bms
