@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "identification/residuals.hpp"
+#include "identification/vanished_pair.hpp"
 #include "identification/variance_parts.hpp"
 #include "measurement/statistics.hpp"
 
@@ -136,6 +137,7 @@ void add_stretches(const JointRecording& r, std::span<const double> simulated_v,
 /// A candidate with its fits.
 struct Tried {
   CandidateResult result;
+  bool pair_vanished = false;  ///< its second pair ended at the least resistance: not a pair, never chosen
   JointFit fit;
   std::vector<JointFit> fold_fits;
 };
@@ -191,11 +193,12 @@ bool within_one_standard_error(const CandidateResult& a, const CandidateResult& 
 
 std::size_t chosen_of(const std::vector<Tried>& tried) {
   const auto best = std::min_element(tried.begin(), tried.end(), [](const Tried& a, const Tried& b) {
+    if (a.pair_vanished != b.pair_vanished) return b.pair_vanished;
     return a.result.left_out_v < b.result.left_out_v;
   });
   std::size_t chosen = static_cast<std::size_t>(best - tried.begin());
   for (std::size_t k = 0; k < tried.size(); ++k) {
-    if (tried[k].result.unknowns < tried[chosen].result.unknowns &&
+    if (!tried[k].pair_vanished && tried[k].result.unknowns < tried[chosen].result.unknowns &&
         within_one_standard_error(tried[k].result, best->result))
       chosen = k;
   }
@@ -318,6 +321,14 @@ StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
     const Eigen::VectorXd start =
         k > 1 ? carried_over(candidates[k].model, candidates[k - 1].model, tried[k - 1].fit) : Eigen::VectorXd();
     tried.push_back(try_candidate(candidates[k], recordings, folds, without_uncertainty, start));
+    const JointModel& model = candidates[k].model;
+    if (!pair_vanished(model, tried[k].fit)) continue;
+    // the rest of this circuit is the first candidate, perhaps at a better optimum than its own search has found
+    tried[k].pair_vanished = true;
+    tried[k].result.name += ": its second pair has no resistance, so it is left out";
+    Tried rest = try_candidate(candidates[0], recordings, folds, without_uncertainty,
+                               carried_over(candidates[0].model, model, tried[k].fit));
+    if (rest.result.left_out_v < tried[0].result.left_out_v) tried[0] = std::move(rest);
   }
   choice.chosen = chosen_of(tried);
   tried[choice.chosen].result.chosen = true;

@@ -220,6 +220,24 @@ TEST(JointStructure, TakesTheSecondPairOnlyWhereTheCellHasOne) {
   }
 }
 
+/// The cell has one pair, and the candidate with one cannot fit it: the one with two does, and its second pair goes to
+/// the least resistance. What is left is one pair, from where that fit was.
+TEST(JointStructure, ASecondPairAtTheLeastResistanceIsNoPair) {
+  const std::vector<JointRecording> recordings = at_temperatures({}, {25, 25});
+  auto candidates = joint_candidates(start_cell(), {}, recordings);
+  candidates.resize(2);
+  candidates[0].model.unknowns[0].low = 0.015;  // R0, which is 13 mOhm
+  candidates[0].model.unknowns[0].start = 0.02;
+  JointUnknown& slow = candidates[1].model.unknowns[3];
+  ASSERT_EQ(slow.name(), "slow_polarisation.resistance_ohm");
+  slow.low = 0.002;
+  const auto choice = choose_structure(candidates, recordings, {.rows = 300});
+  EXPECT_LT(choice.candidates[1].left_out_v, choice.candidates[0].left_out_v) << "or this test shows nothing";
+  EXPECT_EQ(choice.candidates[1].name, "two RC pairs: its second pair has no resistance, so it is left out");
+  EXPECT_EQ(choice.chosen, 0U);
+  EXPECT_EQ(choice.model.mechanisms.size(), 0U);
+}
+
 TEST(JointStructure, LeavesOutWhatTheRecordingsAllow) {
   const struct {
     std::vector<double> all_c;
