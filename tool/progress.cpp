@@ -104,12 +104,12 @@ workflow::Progress progress_on_stderr(
           shown_s = std::make_shared<double>(line.terminal() ? -every_s : 0)](double done, const std::string& what) {
     const double seconds = std::chrono::duration<double>(Clock::now() - begin).count();
     if (done >= 1) return line.clear();
-    if (seconds - *shown_s < pause_s) return;
     const double left_s = done > 0 ? seconds / done * (1 - done) : std::numeric_limits<double>::infinity();
     const std::string text = text_of(done, left_s, what);
     if (text.empty()) return;
+    line.set_latest(text);  // also for the next line of the heartbeat
+    if (seconds - *shown_s < pause_s) return;
     *shown_s = seconds;
-    line.set_latest(text);
     line.show(text);
   };
 }
