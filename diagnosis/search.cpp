@@ -212,12 +212,14 @@ std::vector<char> Search::far_better(const HypothesisFit& around, const std::vec
   std::vector<char> better(candidates.size(), 0);
   measurement::in_parallel(candidates.size(), [&](std::size_t k) {
     const bool promising = candidates[k].gain >= candidate_limits.worth_a_fit;
-    if (promising && k < candidate_limits.fits) return;  // is fitted, from its far starts as well
+    // a start that the recording states elsewhere is a reading, which no signature outranks
+    const bool stated = candidates[k].mechanism == model::mechanism_index_of<model::InitialSoc> &&
+                        likelihood_.facts().start_shift.has_value();
+    if (promising && (!stated || k < candidate_limits.fits)) return;  // the best are fitted from far starts as well
     if (!promising && joint_start(with(around.hypothesis, candidates[k].start))) better[k] = 1;
-    const double promised = std::max(candidates[k].gain, candidate_limits.worth_a_fit);
     for (std::size_t b = 0; b < bases.size() && better[k] == 0; ++b) {
       const auto far = far_start(with(around.hypothesis, candidates[k].start), bases[b]);
-      if (far && far->cost < without[b] - promised) better[k] = 1;
+      if (far && far->cost < without[b] - candidate_limits.worth_a_fit) better[k] = 1;
     }
   });
   return better;

@@ -120,8 +120,8 @@ class Search {
   std::array<Eigen::VectorXd, 2> far_bases(const HypothesisFit& around) const;
   /// Where the last mechanism takes over a part of what another one explains; nothing if it has no such start.
   std::optional<Hypothesis> joint_start(Hypothesis h) const;
-  /// By candidate: 1 if a far start gains more than the signature promises, which is linear, or if there is a joint
-  /// start. The candidates, by falling gain, that are fitted in any case have 0.
+  /// By candidate: 1 if a far start is better where the signature, which is linear, sees nothing, or if there is a
+  /// joint start; of a wrong start also if the recording states another one, whatever the signature sees.
   std::vector<char> far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const;
   /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best) const;

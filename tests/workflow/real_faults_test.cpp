@@ -104,7 +104,7 @@ TEST(RealFaults, WhatALeadWandersIsNotSelfHeating) {
   measurement::Recording behind_a_lead = read("B0043", "d002_load", file);
   behind_a_lead.current_ref_a = behind_a_lead.voltage_ref_v = {};
   const auto causes = causes_of(file, {read("B0043", "d004", file), behind_a_lead});
-  ASSERT_EQ(causes.size(), 1);
+  ASSERT_EQ(causes.size(), 1) << testing::PrintToString(causes);
   EXPECT_EQ(causes.front().front(), "contact_step");
 }
 
