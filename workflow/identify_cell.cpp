@@ -84,12 +84,13 @@ Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector
   adapt_start(options, inputs.recordings, start, warnings);
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
   for (measurement::Recording& r : inputs.recordings) {
-    if (!r.read_as.empty()) read_as.push_back(r.path + ": " + r.read_as);
+    const std::string& path = r.path;
+    if (!r.read_as.empty()) read_as.push_back(path + ": " + r.read_as);
     measurement::compare_with_cell(r, start.cell.parameters);
     check_size(options, start, r);
-    for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, r.path + ": " + w.text});
+    for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, path + ": " + w.text});
     IdentificationData d = identification_data(r, inputs.options);
-    filter(options, r.path, d.record.data, warnings);
+    filter(options, path, d.record.data, warnings);
     inputs.data_sets.push_back(start.has_hysteresis ? without_mechanisms(start.cell, d) : d.record);
     inputs.soc_min = std::min(inputs.soc_min, d.soc_min);
     inputs.soc_max = std::max(inputs.soc_max, d.soc_max);
@@ -238,11 +239,10 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   grey_box.bounds = circuit_bounds(p.capacity_ah);
   grey_box.estimate_ocv_branch = !options.ocv_branch && !start.has_hysteresis && p.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = p.noise.voltage_v;
-  const auto started = id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds);
-  grey_box.ocv_sigma_v = ocv_sigma_v(start.ocv, started);
-  grey_box.ocv_ends_unmeasured = start.ocv.temperatures > 0;
   try {
-    result.identification = id::identify_grey_box(started, main.data_sets, grey_box, options.method);
+    result.identification =
+        id::identify_grey_box(id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds), main.data_sets,
+                              grey_box, options.method);
     if (!options.extend) {  // else the joint fit replaces it
       for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
     }
