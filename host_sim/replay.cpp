@@ -224,21 +224,21 @@ void write_trace(const ReplayResult& result, const files::Sink& sink) {
   std::string csv = "time_s,soc,soc_sigma,v_rc_v,voltage_predicted_v,voltage_measured_v,";
   for (const std::string& name : names) csv += name + ",";
   csv += "flags\n";
+  const auto field = [&](auto value) {  // empty: missing
+    if (std::isfinite(value)) fmt::format_to(std::back_inserter(csv), "{}", value);
+    csv += ",";
+  };
   const auto number = [&](double value) {
-    if (!std::isfinite(value))
-      csv += ",";  // missing
-    else if (result.scalar == ScalarKind::float32)
-      fmt::format_to(std::back_inserter(csv), "{},", static_cast<float>(value));
+    if (result.scalar == ScalarKind::float32)
+      field(static_cast<float>(value));
     else
-      fmt::format_to(std::back_inserter(csv), "{},", value);
+      field(value);
   };
   for (std::size_t k = 0; k < result.track.rows.size(); ++k) {
     const EstimateRow e = result.track.rows[k];
     fmt::format_to(std::back_inserter(csv), "{},", result.recording.time_s[k]);
     for (const double value : {e.soc, e.soc_sigma, e.v_rc_v, e.voltage_predicted_v}) number(value);
-    if (const double measured_v = result.recording.voltage_v[k]; std::isfinite(measured_v))
-      fmt::format_to(std::back_inserter(csv), "{}", measured_v);
-    csv += ",";
+    field(result.recording.voltage_v[k]);
     for (std::size_t i = 0; i < names.size(); ++i) number(result.track.state(k, i));
     fmt::format_to(std::back_inserter(csv), "{}\n", e.flags);
     if (csv.size() < piece_bytes) continue;

@@ -8,7 +8,7 @@
 
 #include "reports/cell_charts.hpp"
 #include "reports/identify_tables.hpp"
-#include "reports/page_order.hpp"
+#include "reports/report_page.hpp"
 
 namespace bms::reports {
 

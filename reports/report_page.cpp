@@ -11,7 +11,6 @@
 
 #include "files/text_file.hpp"
 #include "reports/embedded_files.hpp"
-#include "reports/page_order.hpp"
 
 namespace bms::reports {
 

@@ -14,6 +14,8 @@ namespace bms::reports {
 std::string replay_report(const host_sim::ReplayResult& result);
 /// A page of tables and charts, one below the other.
 std::string page_of(const files::PageContent& content);
+/// The same, the charts first.
+std::string page_with_charts_first(const files::PageContent& content);
 
 /// What a page may connect to while it is open.
 enum class Connections { none, own_server };

@@ -203,7 +203,8 @@ class IdentifyCommand final : public Command {
       if (!output_.quiet) fmt::print(stderr, "{}\n", files::printable(text));
     }
     for (const measurement::Warning& w : result.warnings) warn(w.text);
-    const auto pulses = workflow::recorded_pulses(o_, result);
+    const bool shown = !output_.json.empty() || !output_.report.empty() || !csv_.empty();  // else not read again
+    const auto pulses = shown ? workflow::recorded_pulses(o_, result) : std::vector<workflow::RecordedPulses>();
     if (!output_.json.empty()) write_output(output_.json, reports::with_pulses(reports::json_of(result), pulses));
     if (!output_.report.empty()) write_output(output_.report, reports::identify_report(result, pulses));
     if (!csv_.empty()) write_csv(result, pulses);

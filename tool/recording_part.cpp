@@ -16,22 +16,21 @@ constexpr std::size_t fewest_rows = 10;  // of any recording
 }  // namespace
 
 void add_part(CLI::App& c, RecordingPart& part) {
-  part.from = c.add_option("--from", part.from_s, "leave out what is earlier, in s since the first row")
-                  ->check(Within(0.0, longest_s))
-                  ->type_name("SECONDS");
-  part.until = c.add_option("--until", part.until_s, "leave out what is later, in s since the first row")
-                   ->check(Within(0.0, longest_s))
-                   ->type_name("SECONDS");
+  c.add_option("--from", part.from_s, "leave out what is earlier, in s since the first row")
+      ->check(Within(0.0, longest_s))
+      ->type_name("SECONDS");
+  c.add_option("--until", part.until_s, "leave out what is later, in s since the first row")
+      ->check(Within(0.0, longest_s))
+      ->type_name("SECONDS");
 }
 
 void cut(const RecordingPart& part, measurement::Recording& recording) {
-  const bool ends = part.until->count() > 0;
-  if (!ends && part.from->count() == 0) return;
+  if (!part.from_s && !part.until_s) return;
   const double duration_s = recording.duration_s();
-  measurement::cut(recording, part.from_s, ends ? part.until_s : longest_s);
+  measurement::cut(recording, part.from_s.value_or(0), part.until_s.value_or(longest_s));
   if (recording.rows() >= fewest_rows) return;
   throw files::BadInput(
-      ends ? "--until" : "--from", 1,
+      part.until_s ? "--until" : "--from", 1,
       fmt::format("leaves {} rows of {:g} s, expected {} or more", recording.rows(), duration_s, fewest_rows));
 }
 

@@ -1,17 +1,17 @@
 // The options --from and --until: a part of a recording.
 #pragma once
 
+#include <optional>
+
 #include <CLI/CLI.hpp>
 
 #include "measurement/recording.hpp"
 
 namespace bms::tool {
 
-/// In s since the first row.
+/// In s since the first row; empty: not given.
 struct RecordingPart {
-  double from_s = 0, until_s = 0;
-  CLI::Option* from = nullptr;
-  CLI::Option* until = nullptr;
+  std::optional<double> from_s, until_s;
 };
 
 /// --from and --until.

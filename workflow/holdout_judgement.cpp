@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <Eigen/Core>
 
+#include "diagnosis/numerics.hpp"
 #include "diagnosis/quantity_text.hpp"
 #include "diagnosis/texts.hpp"
 #include "identification/residuals.hpp"
@@ -97,7 +98,7 @@ double probability_of(std::span<const double> errors) {
   const auto rows = static_cast<double>(known.size());
   const double independent = std::max(1.0, rows / identification::correlation_length(known));
   // the cube root of chi square over its degrees of freedom is nearly normal (Wilson and Hilferty 1931)
-  const double variance = 2 / (9 * independent),
+  const double variance = diagnosis::numerics.statistics.wilson_hilferty / independent,
                away = (std::cbrt(known.squaredNorm() / rows) - (1 - variance)) / std::sqrt(variance);
   return std::erfc(away / std::sqrt(2)) / 2;
 }
