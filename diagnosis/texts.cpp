@@ -167,8 +167,15 @@ std::string causes_text(const Diagnosis& d, const RecordingFacts& facts) {
                         millivolts(d.unexplained_rmse_v))
           : fmt::format("{} together explain {} of it, {} remain", number, percent(d.explained_share),
                         millivolts(d.unexplained_rmse_v));
-  return fmt::format("{} {}: {}. Begin with the first: {}", model_error(facts), explained, joined(parts, "and"),
-                     text_of_mechanism(d.findings.front().setting.index).action);
+  const auto in_cell = static_cast<std::size_t>(std::count_if(d.findings.begin(), d.findings.end(), [](const auto& f) {
+    return model::catalogue[f.setting.index].domain == model::Domain::physics;
+  }));
+  const std::string_view another_cell =
+      in_cell < text_style.changes_of_a_cell
+          ? ""
+          : " So much at once is also what the file of another cell looks like: check that this one is the cell's.";
+  return fmt::format("{} {}: {}.{} Begin with the first: {}", model_error(facts), explained, joined(parts, "and"),
+                     another_cell, text_of_mechanism(d.findings.front().setting.index).action);
 }
 
 std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {

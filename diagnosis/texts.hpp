@@ -51,6 +51,7 @@ struct TextStyle {
   double differs_share = 0.1;           ///< share by which a resistance differs from that at another temperature
   double better_times = 2;              ///< ratio of standard deviations from which a resistance is known better
   double rest_named_s = 60;             ///< shorter rests do not count
+  std::size_t changes_of_a_cell = 3;    ///< causes in the cell from which another cell's file is as likely
 };
 inline constexpr TextStyle text_style{};
 

@@ -11,6 +11,9 @@
 #include <ceres/jet.h>
 
 #include "identification/discretiser.hpp"
+#include "identification/grey_box_limits.hpp"
+#include "identification/ocv_curve.hpp"
+#include "identification/ocv_error.hpp"
 
 namespace bms::identification {
 
@@ -60,9 +63,6 @@ model::TablePoint<S> localised(const model::TablePoint<double>& at) {
 /// |SOC| from which on a simulation counts as not finite.
 constexpr double largest_soc = 7;
 
-/// RMS of the logarithmic ratio of neighbours in Table 9: R0, R1, C1.
-constexpr std::array<double, 3> neighbours_differ = {0.044, 0.28, 0.27};
-
 /// The two nodes around an SOC and the weight of the upper one.
 struct Between {
   std::size_t below = 0, above = 0;
@@ -84,48 +84,6 @@ double half_gap_v(const model::OcvTable<double>& ocv, double soc) {
   if (above == ocv.soc.size) return ocv.half_gap_v[above - 1];
   const double t = (soc - ocv.soc[above - 1]) / (ocv.soc[above] - ocv.soc[above - 1]);
   return ocv.half_gap_v[above - 1] + t * (ocv.half_gap_v[above] - ocv.half_gap_v[above - 1]);
-}
-
-struct Limits {
-  double lower, upper, scale;
-};
-
-Limits limits_of(Quantity quantity, const CircuitBounds& b) {
-  switch (quantity) {
-    case Quantity::r0:
-      return {b.r0_min_ohm, b.r0_max_ohm, 0.01};
-    case Quantity::r1:
-      return {b.r1_min_ohm, b.r1_max_ohm, 0.01};
-    case Quantity::c1:
-      return {b.c1_min_f, b.c1_max_f, 1'000};
-    case Quantity::ocv_branch:
-      return {-1, 1, 0.1};
-    case Quantity::initial_soc:
-      return {-0.05, 1.05, 0.1};
-    case Quantity::initial_v_rc:
-      return {-0.5, 0.5, 0.01};  // V
-  }
-  return {};
-}
-
-/// Branch positions at which the OCV rises everywhere, and no steeper than a cell file may state: slow charge and
-/// discharge need not be parallel near empty.
-Limits branch_limits(const model::OcvTable<double>& ocv) {
-  constexpr double least_slope_v = 1e-3, most_slope_v = 59;  // per unit of soc
-  Limits limits = limits_of(Quantity::ocv_branch, {});
-  for (std::size_t k = 0; k + 1 < ocv.half_gap_v.size; ++k) {
-    const double gap_slope_v = (ocv.half_gap_v[k + 1] - ocv.half_gap_v[k]) / (ocv.soc[k + 1] - ocv.soc[k]);
-    if (gap_slope_v == 0) continue;
-    const double to_least = ocv.lean - std::max(0.0, ocv.b1_v[k] - least_slope_v) / gap_slope_v,
-                 to_most = ocv.lean + std::max(0.0, most_slope_v - ocv.b1_v[k]) / gap_slope_v;
-    limits.lower = std::max(limits.lower, std::min(to_least, to_most));
-    limits.upper = std::min(limits.upper, std::max(to_least, to_most));
-  }
-  return limits;
-}
-
-Limits limits_within(Quantity quantity, const model::CellParameters<>& cell, const CircuitBounds& b) {
-  return quantity == Quantity::ocv_branch ? branch_limits(cell.ocv) : limits_of(quantity, b);
 }
 
 }  // namespace
@@ -318,7 +276,8 @@ LeastSquares GreyBox::problem() const {
 }
 
 bool GreyBox::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eigen::MatrixXd* jacobian) const {
-  const auto rows = static_cast<Eigen::Index>(samples_ + priors_ + ties());
+  const Eigen::Index ocv_rows = ocv_errs() ? OcvError::nodes() : 0;
+  const auto rows = static_cast<Eigen::Index>(samples_ + priors_ + ties()) + ocv_rows;
   residuals.setZero(rows);
   if (jacobian != nullptr) jacobian->setZero(rows, x.size());
   Eigen::Index from = 0, prior = static_cast<Eigen::Index>(samples_);
@@ -334,7 +293,11 @@ bool GreyBox::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& residuals, Eig
       ++prior;
     }
   }
-  if (ties() > 0) add_ties(x, prior, residuals, jacobian);
+  if (ocv_rows > 0) {
+    const OcvError error(ocv_error_prior(), options_.tie_v);
+    error.take_out(counted_soc(x), residuals.head(from), residuals.segment(prior, ocv_rows), jacobian, prior);
+  }
+  if (ties() > 0) add_ties(x, prior + ocv_rows, residuals, jacobian);
   return true;
 }
 
@@ -361,13 +324,51 @@ bool GreyBox::add_simulation(const Eigen::VectorXd& x, std::size_t r, Eigen::Ind
   return true;
 }
 
+Eigen::VectorXd GreyBox::counted_soc(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd counted(static_cast<Eigen::Index>(samples_));
+  Eigen::Index row = 0;
+  for (std::size_t r = 0; r < records_.size(); ++r) {
+    const Data& data = records_[r].data;
+    const auto start = unknown(Quantity::initial_soc, r);
+    double soc = start ? x[*start] : records_[r].initial_soc;
+    for (std::size_t k = 0; k < data.size(); ++k) {
+      if (k > 0 && std::isfinite(data.current_a[k]))
+        soc += data.current_a[k] * (data.time_s[k] - data.time_s[k - 1]) / (3'600 * cell_.capacity_ah);
+      counted[row++] = std::isfinite(data.voltage_v[k]) ? soc : std::numeric_limits<double>::quiet_NaN();
+    }
+  }
+  return counted;
+}
+
+std::pair<double, double> GreyBox::soc_range(const Eigen::VectorXd& x) const {
+  std::pair<double, double> range = {1, 0};
+  for (const double soc : counted_soc(x)) {
+    if (std::isfinite(soc)) range = {std::min(range.first, soc), std::max(range.second, soc)};
+  }
+  return range;
+}
+
+OcvErrorPrior GreyBox::ocv_error_prior() const {
+  if (!options_.ocv_ends_unmeasured) return {options_.ocv_sigma_v, 0, 0};
+  const model::OcvTable<double>& ocv = cell_.ocv;
+  return {options_.ocv_sigma_v, unmeasured_end * ocv.b1_v[0], unmeasured_end * ocv.b1_v[ocv.b1_v.size - 1]};
+}
+
+double step_between(std::size_t quantity, double below_soc, double above_soc) {
+  constexpr double inner_low = 0.2, inner_high = 0.9, rounding = 1e-9;
+  const bool inner = below_soc > inner_low - rounding && above_soc < inner_high + rounding;
+  return (inner ? neighbours_differ : neighbours_differ_at_ends)[quantity];
+}
+
 /// Logarithmic ratios of neighbouring nodes, weighted by those of Table 9.
 void GreyBox::add_ties(const Eigen::VectorXd& x, Eigen::Index row, Eigen::VectorXd& residuals,
                        Eigen::MatrixXd* jacobian) const {
   const auto count = static_cast<Eigen::Index>(nodes());
   for (Eigen::Index k = 0; k < 3 * count; ++k) {
     if (k % count == count - 1) continue;
-    const double weight_v = options_.tie_v / neighbours_differ[static_cast<std::size_t>(k / count)];
+    const auto node = static_cast<std::size_t>(k % count);
+    const double weight_v = options_.tie_v / step_between(static_cast<std::size_t>(k / count), options_.soc_nodes[node],
+                                                          options_.soc_nodes[node + 1]);
     residuals[row] = weight_v * std::log(x[k + 1] / x[k]);
     if (jacobian != nullptr) {
       (*jacobian)(row, k) = -weight_v / x[k];

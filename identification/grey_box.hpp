@@ -8,13 +8,16 @@
 // one node more costs one multiplication per sample.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "identification/data.hpp"
 #include "identification/least_squares.hpp"
+#include "identification/ocv_error.hpp"
 #include "model/cell.hpp"
 
 namespace bms::identification {
@@ -35,6 +38,14 @@ struct CircuitBounds {
   double c1_min_f = 100, c1_max_f = 50'000;
 };
 
+/// RMS of the logarithmic ratio of neighbours in Table 9, whose nodes are tenths: R0, R1, C1. All, and those at its
+/// ends (10 to 20 and 90 to 100 %), where the curves bend.
+inline constexpr std::array<double, 3> neighbours_differ = {0.044, 0.28, 0.27},
+                                       neighbours_differ_at_ends = {0.09, 0.56, 0.52};
+
+/// Standard deviation of the logarithmic ratio of neighbours; quantity: 0 R0, 1 R1, 2 C1.
+double step_between(std::size_t quantity, double below_soc, double above_soc);
+
 struct GreyBoxOptions {
   std::vector<double> soc_nodes;  ///< ascending, one or more; one: constant parameters
   CircuitBounds bounds;
@@ -42,6 +53,12 @@ struct GreyBoxOptions {
   double voltage_sigma_v = 0.001;    ///< weight of a voltage residual against a prior
   /// Residual of two neighbouring nodes that differ as much as those of Table 9 do; 0: nodes are independent.
   double tie_v = 0;
+  /// Standard deviation of the error of the OCV curve, which is marginalised (ocv_error.hpp); 0: none. A residual of
+  /// tie_v stands for one standard deviation.
+  double ocv_sigma_v = 0;
+  bool ocv_ends_unmeasured = false;  ///< the curve is from a slow run (ocv_error.hpp)
+  /// Error of an OCV curve that follows the voltages of the fit: its residuals do not show it, but it is in them.
+  double ocv_hidden_v = 0;
   bool one_start = false;  ///< only the start given, without other time constants
 };
 
@@ -68,10 +85,16 @@ class GreyBox {
   const GreyBoxOptions& options() const { return options_; }
   /// The values of the cell, clamped to the bounds.
   Eigen::VectorXd start() const;
-  /// Residuals in V: simulated minus measured, 0 in rows without a voltage. Then one row per prior of an initial SOC,
-  /// and one per pair of neighbouring nodes where these are tied. The problem refers to this object.
+  /// Residuals in V: simulated minus measured, 0 in rows without a voltage; with the error of the OCV that is best for
+  /// these unknowns, if it has one. Then one row per prior of an initial SOC, the prior of that error, and one row per
+  /// pair of neighbouring nodes where these are tied. The problem refers to this object.
   LeastSquares problem() const;
   std::size_t samples() const { return samples_; }
+  /// SOC of all samples, NaN without a voltage.
+  Eigen::VectorXd counted_soc(const Eigen::VectorXd& x) const;
+  /// Lowest and highest SOC of the samples with a voltage.
+  std::pair<double, double> soc_range(const Eigen::VectorXd& x) const;
+  std::size_t ties() const { return options_.tie_v > 0 ? 3 * (nodes() - 1) : 0; }
 
   /// Terminal voltage over recording r. derivatives: samples by unknowns, or null. Returns false if not finite.
   bool simulate(const Eigen::VectorXd& x, std::size_t r, Eigen::Ref<Eigen::VectorXd> voltage_v,
@@ -90,7 +113,8 @@ class GreyBox {
   void add_ties(const Eigen::VectorXd& x, Eigen::Index row, Eigen::VectorXd& residuals,
                 Eigen::MatrixXd* jacobian) const;
   std::size_t nodes() const { return options_.soc_nodes.size(); }
-  std::size_t ties() const { return options_.tie_v > 0 ? 3 * (nodes() - 1) : 0; }
+  bool ocv_errs() const { return options_.tie_v > 0 && options_.ocv_sigma_v > 0; }
+  OcvErrorPrior ocv_error_prior() const;
   std::optional<Eigen::Index> unknown(Quantity quantity, std::size_t record) const;
 
   model::CellParameters<> cell_;

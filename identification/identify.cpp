@@ -7,7 +7,10 @@
 
 #include <fmt/format.h>
 
+#include "identification/between_nodes.hpp"
 #include "identification/goodness_of_fit.hpp"
+#include "identification/grey_box_search.hpp"
+#include "identification/ocv_curve.hpp"
 #include "identification/rest_reading.hpp"
 
 namespace bms::identification {
@@ -17,10 +20,6 @@ namespace {
 constexpr std::size_t fewest_samples = 10;
 constexpr double least_excitation_c_rate = 0.02;  // step of the current from sample to sample
 constexpr double uncertain_fraction = 0.5;        // standard deviation over value that gives a warning
-
-/// Start values of the time constant, as multiples of the given one: C1 decides which of several minima is found.
-constexpr double time_constants[] = {1, 0.2, 5};
-constexpr double same_cost = 1e-4;  // relative difference of two optima that count as the same
 
 /// Standard deviation of a state of charge of which nothing is known: uniform over 0..1.
 constexpr double unknown_soc_std = 0.29;
@@ -124,46 +123,28 @@ void warn_of_search(Identification& result) {
   }
 }
 
-/// The best of the optima from all start values.
-void search(const GreyBox& grey_box, const LeastSquares& problem, Method method, const Stopping& stopping,
-            Identification& result) {
-  const auto nodes = static_cast<Eigen::Index>(grey_box.options().soc_nodes.size());
-  std::vector<double> costs;
-  int evaluations = 0;
-  for (const double factor : time_constants) {
-    Eigen::VectorXd x = grey_box.start();
-    x.segment(2 * nodes, nodes) *= factor;
-    Optimum found = minimise(problem, x, method, stopping);
-    costs.push_back(found.cost);
-    evaluations += found.evaluations;
-    if (costs.size() == 1 || found.cost < result.optimum.cost) result.optimum = std::move(found);
-    if (grey_box.options().one_start) break;
-  }
-  result.optimum.evaluations = evaluations;
-  result.starts = static_cast<int>(costs.size());
-  result.agreeing = static_cast<int>(std::count_if(
-      costs.begin(), costs.end(), [&](double c) { return c <= result.optimum.cost * (1 + same_cost) + 1e-18; }));
-}
-
 /// Uncertainty at the optimum. Rows without a measured voltage are left out.
-Uncertainty uncertainty_at(const GreyBox& grey_box, const LeastSquares& problem, const Optimum& optimum,
-                           double ocv_tolerance_v) {
+Uncertainty uncertainty_at(const GreyBox& grey_box, const Optimum& optimum, double ocv_tolerance_v) {
   Eigen::VectorXd residuals;
   Eigen::MatrixXd jacobian;
-  if (!problem.evaluate(optimum.x, residuals, &jacobian))
+  if (!grey_box.problem().evaluate(optimum.x, residuals, &jacobian))
     throw std::invalid_argument("the simulation is not finite, expected a start nearer to the cell");
+  Eigen::MatrixXd unmodelled;  // the priors are those of curves; the paper's procedure has none
+  if (grey_box.options().tie_v > 0) unmodelled = changes_between_nodes(grey_box, optimum.x);
   const auto samples = static_cast<Eigen::Index>(grey_box.samples());
   Eigen::Index rows = 0, sampled = 0;
   for (Eigen::Index k = 0; k < residuals.size(); ++k) {
     if (k == samples) sampled = rows;
     if (residuals[k] == 0 && jacobian.row(k).isZero(0)) continue;
     residuals[rows] = residuals[k];
+    if (unmodelled.size() > 0) unmodelled.row(rows) = unmodelled.row(k);
     jacobian.row(rows++) = jacobian.row(k);
   }
   if (residuals.size() == samples) sampled = rows;
   residuals.conservativeResize(rows);
   jacobian.conservativeResize(rows, Eigen::NoChange);
-  return uncertainty(residuals, jacobian, sampled, optimum.at_bound, ocv_tolerance_v);
+  if (unmodelled.size() > 0) unmodelled.conservativeResize(rows, Eigen::NoChange);
+  return uncertainty(residuals, jacobian, sampled, optimum.at_bound, ocv_tolerance_v, unmodelled);
 }
 
 /// Parameters, initial states and their warnings from the unknowns at the optimum.
@@ -246,13 +227,13 @@ void set_estimation(const GreyBox& grey_box, const Uncertainty& u, Identificatio
   result.estimation.output_variance_v2 = u.output_variance_v2;
 }
 
-Identification identified(const model::CellParameters<>& start, const std::vector<DataSet>& records,
-                          const GreyBoxOptions& options, Method method, const Stopping& stopping) {
-  const GreyBox grey_box(start, records, options);
-  const LeastSquares problem = grey_box.problem();
+Identification described(const GreyBox& grey_box, const Search& found) {
   Identification result;
-  search(grey_box, problem, method, stopping, result);
-  const Uncertainty u = uncertainty_at(grey_box, problem, result.optimum, start.tolerance.ocv_v);
+  result.optimum = found.optimum;
+  result.starts = found.starts;
+  result.agreeing = found.agreeing;
+  result.options = grey_box.options();
+  const Uncertainty u = uncertainty_at(grey_box, result.optimum, grey_box.cell_with(result.optimum.x).tolerance.ocv_v);
   result.correlation = u.correlation;
   result.correlation_length = u.correlation_length;
   set_parameters(grey_box, u, result);
@@ -260,6 +241,28 @@ Identification identified(const model::CellParameters<>& start, const std::vecto
   set_estimation(grey_box, u, result);
   warn_of_search(result);
   return result;
+}
+
+/// With an error of the OCV the branch position is free to be anywhere. It becomes the one with which the cell, which
+/// has no such error, follows the recordings best. The voltage is linear in it.
+void set_ocv_branch(const GreyBox& grey_box, Eigen::VectorXd& x) {
+  if (!grey_box.options().estimate_ocv_branch || grey_box.options().ocv_sigma_v == 0) return;
+  GreyBoxOptions exact = grey_box.options();
+  exact.ocv_sigma_v = 0;
+  const GreyBox cell(grey_box.cell_with(x), grey_box.records(), exact);
+  const LeastSquares problem = cell.problem();
+  const auto branch = static_cast<Eigen::Index>(3 * exact.soc_nodes.size());
+  Eigen::VectorXd residuals;
+  Eigen::MatrixXd jacobian;
+  if (!problem.evaluate(x, residuals, &jacobian)) return;
+  const Eigen::VectorXd soc = cell.counted_soc(x);
+  for (Eigen::Index k = 0; k < soc.size(); ++k) {
+    if (exact.ocv_ends_unmeasured && (soc[k] < unmeasured_end || soc[k] > 1 - unmeasured_end)) jacobian(k, branch) = 0;
+  }
+  const auto column = jacobian.col(branch);
+  if (!(column.squaredNorm() > 0)) return;
+  x[branch] = std::clamp(x[branch] - column.dot(residuals) / column.squaredNorm(), problem.lower[branch],
+                         problem.upper[branch]);
 }
 
 }  // namespace
@@ -300,18 +303,33 @@ FitStatistics fit_of(std::span<const double> measured_v, const Eigen::VectorXd& 
 Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<DataSet>& records,
                                  const GreyBoxOptions& options, Method method, const Stopping& stopping) {
   require_excitation(records);
-  if (options.soc_nodes.size() < 2) return identified(start, records, options, method, stopping);
-  // First with constant parameters: this gives the start values of the nodes. Its residuals, which come in runs, are
-  // the measure of how far neighbouring nodes may differ.
   GreyBoxOptions constant = options;
-  constant.soc_nodes = {0.5};
-  const Identification first = identified(start, records, constant, method, stopping);
+  if (options.soc_nodes.size() > 1) constant.soc_nodes = {0.5};
+  const GreyBox one_node(start, records, constant);
+  if (options.soc_nodes.size() < 2 && options.ocv_sigma_v > 0) {
+    Search found = search_with_prior(start, records, constant, starts_of(one_node), method, stopping);
+    constant.tie_v = found.tie_v;
+    const GreyBox with_prior(start, records, constant);
+    set_ocv_branch(with_prior, found.optimum.x);
+    return described(with_prior, found);
+  }
+  const Search first = best_optimum(one_node, starts_of(one_node), method, stopping);
+  if (options.soc_nodes.size() < 2) return described(one_node, first);
+  // the nodes begin at the constant parameters, and at those of the start cell
+  const model::CellParameters<> cell = one_node.cell_with(first.optimum.x);
   GreyBoxOptions tied = options;
-  tied.tie_v = first.estimation.rmse_v * std::sqrt(first.correlation_length);
-  Identification result = identified(first.cell, records, tied, method, stopping);
-  result.optimum.iterations += first.optimum.iterations;
-  result.optimum.evaluations += first.optimum.evaluations;
-  return result;
+  const GreyBox nodes(cell, records, tied);
+  std::vector<Eigen::VectorXd> starts = starts_of(nodes);
+  starts.push_back(GreyBox(start, records, tied).start());
+  const Eigen::Index states = first.optimum.x.size() - 3;  // the branch position and the initial states
+  for (Eigen::VectorXd& x : starts) x.tail(states) = first.optimum.x.tail(states);
+  Search found = search_with_prior(cell, records, tied, starts, method, stopping);
+  found.optimum.iterations += first.optimum.iterations;
+  found.optimum.evaluations += first.optimum.evaluations;
+  tied.tie_v = found.tie_v;
+  const GreyBox with_prior(cell, records, tied);
+  set_ocv_branch(with_prior, found.optimum.x);
+  return described(with_prior, found);
 }
 
 model::CellParameters<> started_from_rests(const model::CellParameters<>& cell, const Data& data,

@@ -63,6 +63,7 @@ struct Identification {
   std::vector<InitialState> initial;  ///< per recording
   Optimum optimum;
   int starts = 1, agreeing = 1;       ///< number of start values, and how many of them led to the best optimum
+  GreyBoxOptions options;             ///< with which the optimum was found
   model::CellParameters<> cell;       ///< the start cell with the identified parameters
   std::vector<std::string> warnings;  ///< "id: sentence"
 };
@@ -73,10 +74,10 @@ inline constexpr double observable_soc_std = 0.05;
 /// Throws std::invalid_argument, with one sentence, if the recording is too short or its current hardly changes.
 void reject_without_excitation(const DataSet& record);
 
-/// With several nodes, neighbours are tied: they may differ as those of Table 9 do, and by more where the data show it.
-/// (The residuals of the model with constant parameters are the measure.) Without ties a node that the data hardly
-/// visit takes any value. Throws std::invalid_argument, with one sentence that names what cannot be identified and
-/// which experiment shows it, when the current never changes or a recording is empty.
+/// With several nodes, neighbours have a prior: they differ as those of Table 9 do, and by more where the data show it
+/// (grey_box_search.hpp). Without it a node that the data hardly visit takes any value. Throws std::invalid_argument,
+/// with one sentence that names what cannot be identified and which experiment shows it, when the current never changes
+/// or a recording is empty.
 Identification identify_grey_box(const model::CellParameters<>& start, const std::vector<DataSet>& records,
                                  const GreyBoxOptions& options, Method method, const Stopping& stopping = {});
 

@@ -95,16 +95,16 @@ std::vector<JointCandidate> joint_candidates(const model::CellParameters<>& cell
   add_circuit(two, half_ohm, fast_s / half_ohm);
   if (temperatures) add_temperature(two);
   add_slow_pair(two, half_ohm);
-  std::vector<JointCandidate> all = {{"one RC pair", one}, {"two RC pairs", two}};
+  std::vector<JointCandidate> all = {{"one RC pair", one, 1}, {"two RC pairs", two, 2}};
   if (!temperatures) return all;
   JointModel own = two, rising = two;
   add_own_energy(own);
   add_rise_towards_empty(rising);
   JointModel both = own;
   add_rise_towards_empty(both);
-  all.push_back({"two RC pairs, each with its activation energy", own});
-  all.push_back({"two RC pairs, rising towards empty in the cold", rising});
-  all.push_back({"two RC pairs, each with its activation energy, rising towards empty in the cold", both});
+  all.push_back({"two RC pairs, each with its activation energy", own, 2});
+  all.push_back({"two RC pairs, rising towards empty in the cold", rising, 2});
+  all.push_back({"two RC pairs, each with its activation energy, rising towards empty in the cold", both, 2});
   return all;
 }
 

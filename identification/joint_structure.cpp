@@ -322,7 +322,7 @@ StructureChoice choose_structure(const std::vector<JointCandidate>& candidates,
         k > 1 ? carried_over(candidates[k].model, candidates[k - 1].model, tried[k - 1].fit) : Eigen::VectorXd();
     tried.push_back(try_candidate(candidates[k], recordings, folds, without_uncertainty, start));
     const JointModel& model = candidates[k].model;
-    if (!pair_vanished(model, tried[k].fit)) continue;
+    if (candidates.size() == 1 || !pair_vanished(model, tried[k].fit)) continue;
     // the rest of this circuit is the first candidate, perhaps at a better optimum than its own search has found
     tried[k].pair_vanished = true;
     tried[k].result.name += ": its second pair has no resistance, so it is left out";

@@ -19,6 +19,7 @@ namespace bms::identification {
 struct JointCandidate {
   std::string name;  ///< of the physics, for the user
   JointModel model;
+  int rc_pairs = 1;
 };
 
 /// One and two RC pairs, activation energies that differ, and resistances that rise towards empty in the cold. With

@@ -16,7 +16,7 @@ const double unknown = std::numeric_limits<double>::quiet_NaN();
 struct Run {
   std::vector<double> voltage_v = std::vector<double>(grid + 1, unknown);
   bool charges = false;
-  double moved_ah = 0, rested_before_v = 0, rested_after_v = 0;
+  double moved_ah = 0, largest_a = 0, rested_before_v = 0, rested_after_v = 0;
 };
 
 struct Moved {
@@ -116,6 +116,7 @@ Run on_grid(const SlowRun& slow) {
   Run run;
   run.charges = moved.charges();
   run.moved_ah = moved.moved_as() / 3'600;
+  run.largest_a = moved.largest_a;
   fill_voltages(g, run.voltage_v);
   run.rested_before_v = d.voltage_v[g.first - 1];
   run.rested_after_v = d.voltage_v.back();
@@ -202,6 +203,7 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
   for (const Run& run : runs) {
     (run.charges ? charged : discharged).push_back(run.moved_ah);
     all.push_back(run.moved_ah);
+    curve.largest_a += run.largest_a / static_cast<double>(runs.size());
   }
   curve.capacity_ah = mean_of(all);
   if (!charged.empty() && !discharged.empty()) curve.coulombic_efficiency = mean_of(discharged) / mean_of(charged);
@@ -214,7 +216,7 @@ OcvCurve ocv_curve(const std::vector<SlowRun>& slow_runs) {
   curve.discharge_v = down;
   curve.half_gap_v = half_gap(up, down);
   curve.ocv_v = middle(up, down, curve.half_gap_v);
-  constexpr std::size_t bend = grid / 100;
+  constexpr auto bend = static_cast<std::size_t>(unmeasured_end * grid);
   anchor(bend, 0, rested(runs, false), curve.ocv_v);
   anchor(grid - bend, grid, rested(runs, true), curve.ocv_v);
   if (!std::all_of(curve.ocv_v.begin(), curve.ocv_v.end(), known))

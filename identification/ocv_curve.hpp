@@ -19,11 +19,16 @@ struct SlowRun {
   measurement::Column soc;
 };
 
+/// Next to empty and full, under current, a run bends into its cut-off voltage. There the curve is a straight line to
+/// the rested voltage and not measured.
+inline constexpr double unmeasured_end = 0.01;
+
 /// Voltages on an even grid of SOC from 0 to 1.
 struct OcvCurve {
   std::vector<double> soc, ocv_v, half_gap_v;  ///< half_gap_v: 0 if there was only one run
   std::vector<double> charge_v, discharge_v;   ///< means of the runs; NaN where no such run has been
   double branch = 0;                           ///< of ocv_v: -1 discharges alone, 1 charges alone, 0 the middle
+  double largest_a = 0;                        ///< mean of the largest currents of the runs
   double capacity_ah = 0;                      ///< mean of the charge that the runs moved
   std::optional<double> coulombic_efficiency;  ///< discharged over charged; only with a run of each kind
 };

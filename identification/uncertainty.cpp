@@ -66,13 +66,18 @@ Eigen::MatrixXd pseudo_inverse(const FreeColumns& free, Eigen::VectorXi& identif
 }
 
 /// The middle of the coloured covariance: the long-run covariance of the scores of the samples, and the priors.
-Eigen::MatrixXd coloured_scores(const Eigen::VectorXd& sample_residuals, Eigen::MatrixXd scores, const Uncertainty& u) {
+/// A sample that decides a parameter alone pulls the fit to itself: its residual is divided by 1 - leverage (HC3;
+/// MacKinnon and White, Journal of Econometrics 29 (1985) 305).
+Eigen::MatrixXd coloured_scores(const Eigen::VectorXd& sample_residuals, Eigen::MatrixXd scores,
+                                const Eigen::MatrixXd& inverse, const Uncertainty& u) {
+  constexpr double least_free = 0.1;  // of a sample
   const Eigen::Index data = sample_residuals.size(), priors = scores.rows() - data;
   const Eigen::MatrixXd of_priors =
       scores.bottomRows(priors).transpose() * scores.bottomRows(priors) * (u.output_variance_v2 * u.correlation_length);
   const auto parameters = static_cast<double>(scores.cols()), n = static_cast<double>(data);
   scores.conservativeResize(data, Eigen::NoChange);
-  scores.array().colwise() *= sample_residuals.array();
+  const Eigen::VectorXd leverage = (scores * inverse).cwiseProduct(scores).rowwise().sum();
+  scores.array().colwise() *= sample_residuals.array() / (1 - leverage.array()).max(least_free);
   const auto window = static_cast<Eigen::Index>(std::clamp(6 * u.correlation_length, 1.0, std::max(1.0, 0.25 * n)));
   // parameters take some freedom from the residuals, and the window takes some from the long run
   const double freedom = n / std::max(1.0, n - parameters) * n / (n - static_cast<double>(window - 1));
@@ -86,7 +91,7 @@ double Uncertainty::std_with_offset(Eigen::Index k) const { return std::hypot(st
 double Uncertainty::std_white(Eigen::Index k) const { return std::sqrt(std::max(0.0, covariance_white(k, k))); }
 
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
-                        const Eigen::VectorXi& fixed, double offset_v) {
+                        const Eigen::VectorXi& fixed, double offset_v, const Eigen::MatrixXd& unmodelled) {
   const Eigen::Index n = jacobian.cols();
   Uncertainty u;
   u.covariance = u.covariance_white = Eigen::MatrixXd::Zero(n, n);
@@ -101,7 +106,11 @@ Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd&
   if (f == 0) return u;
   const Eigen::MatrixXd inverse = pseudo_inverse(free, u.identifiable);
   const Eigen::VectorXd shift = inverse * free.scaled.topRows(data).colwise().sum().transpose() * offset_v;
-  const Eigen::MatrixXd coloured = inverse * coloured_scores(residuals.head(data), free.scaled, u) * inverse;
+  Eigen::MatrixXd coloured = inverse * coloured_scores(residuals.head(data), free.scaled, inverse, u) * inverse;
+  if (unmodelled.size() > 0) {
+    const Eigen::MatrixXd shifts = inverse * (free.scaled.transpose() * unmodelled);
+    coloured += shifts * shifts.transpose();
+  }
   for (Eigen::Index a = 0; a < f; ++a) {
     u.offset[free.of(a)] = shift[a] / free.norm[a];
     for (Eigen::Index b = 0; b < f; ++b) {

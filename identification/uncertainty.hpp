@@ -3,6 +3,8 @@
 //   white      s^2 (J'J)^-1, as if the residuals were white
 //   coloured   (J'J)^-1 J' W J (J'J)^-1, W from the autocorrelation of the residuals. Residuals of a battery model come
 //              in long runs; each run counts once (Newey and West, Econometrica 55 (1987) 703, Bartlett window)
+//   unmodelled what the model lacks and of which only a standard deviation is known: its effect on the parameters is
+//              added to the coloured covariance
 //   offset     change of the parameters by a voltage error that is constant over the recording (of the OCV curve, of
 //              the sensor); more samples do not reduce it
 //
@@ -29,7 +31,8 @@ struct Uncertainty {
 
 /// residuals: m. jacobian: m by n. The first `data` rows are samples in order; the others are priors, each of which
 /// counts as one run of residuals. fixed: n, not 0 for parameters at a bound. offset_v: the constant error, >= 0.
+/// unmodelled: m by any number of columns, the change of the residuals by one standard deviation of each; or empty.
 Uncertainty uncertainty(const Eigen::VectorXd& residuals, const Eigen::MatrixXd& jacobian, Eigen::Index data,
-                        const Eigen::VectorXi& fixed, double offset_v);
+                        const Eigen::VectorXi& fixed, double offset_v, const Eigen::MatrixXd& unmodelled = {});
 
 }  // namespace bms::identification

@@ -8,6 +8,7 @@
 #include "images/firmware_image.hpp"
 #include "images/flash_plan.hpp"
 #include "tool/commands.hpp"
+#include "tool/progress.hpp"
 
 namespace bms::tool {
 
@@ -60,6 +61,7 @@ int flash(const FlashOptions& o) {
     throw files::BadInput("openocd", 1,
                           "not installed, expected OpenOCD (Debian: apt-get install openocd; ./bms flash installs it)");
   }
+  set_stage("building the firmware");
   const auto image = images::firmware_image(
       o.board, files::read_cell(o.cell.empty() ? images::board_setting(o.board, "BMS_DEFAULT_CELL") : o.cell),
       images::chip_image(o.board), "none", o.cells);
@@ -74,6 +76,7 @@ int flash(const FlashOptions& o) {
     fmt::print("{}\n", line);
     return 0;
   }
+  set_stage("writing and comparing");
   if (images::ChildProcess(command, log).wait() == 0) {
     fmt::print("{}: written, compared, started{}\n", image.string(),
                storage ? "; the stored records are unchanged" : "");

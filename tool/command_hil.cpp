@@ -208,6 +208,7 @@ hil::SessionPlan read(const HilOptions& options) {
 /// dump: takes the board's frames in candump format if the options ask for them.
 hil::SessionResult compute(const HilOptions& options, const hil::SessionPlan& plan, std::string& dump) {
   const files::CellFile board_cell = options.board_cell.empty() ? plan.cell : files::read_cell(options.board_cell);
+  if (options.port.empty()) set_stage("building the firmware");
   const auto link = options.port.empty()
                         ? hil::emulated_link(
                               options.board,

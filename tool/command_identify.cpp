@@ -12,6 +12,7 @@
 #include "reports/json_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "tool/progress.hpp"
 #include "workflow/identify_cell.hpp"
 #include "workflow/learn_healthy.hpp"
 
@@ -128,7 +129,7 @@ class IdentifyCommand final : public Command {
         *c.add_option("--csv", csv_, "folder for the tables as CSV: parameters, their correlations, pulse resistances")
              ->check(not_empty())
              ->type_name("FOLDER");
-    each.excludes(&csv)->excludes("--report")->excludes("--extend")->excludes("--healthy");
+    each.excludes(&csv)->excludes("--report")->excludes("--extend")->excludes("--rc")->excludes("--healthy");
     return &c;
   }
 
@@ -140,6 +141,9 @@ class IdentifyCommand final : public Command {
     output_.protect(inputs);
     complete_reading(o_.reading);
     parse();
+    o_.progress = progress_on_stderr(0.2, [](double done, double, const std::string& what) {
+      return fmt::format("{:3.0f} %: {:40}", 100 * done, what);
+    });
     try {
       return each_cell_ ? identify_each_cell() : write(workflow::identify_cell(o_));
     } catch (const workflow::FailedFit& failed) {
@@ -289,6 +293,9 @@ class IdentifyCommand final : public Command {
     c.add_flag("--extend", o_.extend,
                "add what an estimator needs: hysteresis between slow charge and discharge, resistances that depend on "
                "the temperature, sensor and model errors as states of the filter");
+    c.add_option("--rc", o_.rc_pairs,
+                 "number of RC pairs, of --extend, which 2 turns on; the number that predicts better if not given")
+        ->check(CLI::IsMember({1, 2}));
     c.add_option(
          "--healthy", o_.healthy,
          "recordings of the healthy cell, also those of --recording: what the model leaves unexplained of each, "
@@ -312,6 +319,7 @@ class IdentifyCommand final : public Command {
 
   void parse() {
     o_.method = method_of(texts_.optimizer);
+    o_.extend = o_.extend || o_.rc_pairs == 2;
     o_.linear = linear_kind(texts_.model);
     o_.initial_soc = workflow::initial_soc_of(texts_.initial_soc);
     o_.window = workflow::window_of("--window", texts_.window);

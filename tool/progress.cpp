@@ -94,6 +94,8 @@ Line& line_of_progress() {
 
 void clear_progress() { line_of_progress().clear(); }
 
+void set_stage(const std::string& stage) { line_of_progress().set_latest(stage); }
+
 workflow::Progress progress_on_stderr(
     double every_s, std::function<std::string(double done, double left_s, const std::string& what)> text_of) {
   if (off()) return {};

@@ -18,6 +18,9 @@ workflow::Progress progress_on_stderr(
 /// Removes the line of a terminal, so that something else can be printed.
 void clear_progress();
 
+/// What the heartbeat says next to the time from here on, of a command that knows its stages only.
+void set_stage(const std::string& stage);
+
 /// While it lives, shows the time that a command has taken if nothing else shows its progress.
 class Heartbeat {
  public:

@@ -126,7 +126,7 @@ identification::CircuitBounds circuit_bounds(double capacity_ah) {
   b.r1_min_ohm = std::max(1e-5, b.r1_min_ohm * times);
   b.r1_max_ohm = std::min(0.5, b.r1_max_ohm * times);
   b.c1_min_f = std::max(100.0, b.c1_min_f / times);
-  b.c1_max_f = std::clamp(b.c1_max_f / times, 1'000.0, 100'000.0);
+  b.c1_max_f = std::clamp(b.c1_max_f / times, 1'000.0, model::accepted::capacitance_f.high);
   return b;
 }
 

@@ -120,6 +120,7 @@ OcvResult identify_ocv(const std::vector<std::string>& paths, const files::ReadO
   }
   cell.parameters.tolerance.ocv_v = std::max(0.0005, pieces->largest_error_v);
   cell.parameters.capacity_ah = curve.capacity_ah;
+  taken.largest_a = curves.front().curve.largest_a;
   taken.coulombic_efficiency = curve.coulombic_efficiency;
   cell.sources["ocv"] = fmt::format("{} of {}; {} straight pieces, within {:.1f} mV",
                                     curve.coulombic_efficiency ? "middle of slow charge and discharge" : "slow run",

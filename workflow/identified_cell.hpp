@@ -17,6 +17,7 @@ struct OcvResult {
   std::optional<double> coulombic_efficiency;          ///< discharged over charged; needs a charge and a discharge
   std::optional<identification::BranchLaws> branches;  ///< from slow runs at three temperatures or more
   std::size_t temperatures = 0;                        ///< of slow runs
+  double largest_a = 0;                                ///< of slow runs
   std::vector<measurement::Warning> warnings;
   std::vector<std::string> read_as;  ///< "FILE: how it was read", of files that are not in the project's own format
 };

@@ -84,13 +84,12 @@ Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector
   adapt_start(options, inputs.recordings, start, warnings);
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
   for (measurement::Recording& r : inputs.recordings) {
-    const std::string& path = r.path;
-    if (!r.read_as.empty()) read_as.push_back(path + ": " + r.read_as);
+    if (!r.read_as.empty()) read_as.push_back(r.path + ": " + r.read_as);
     measurement::compare_with_cell(r, start.cell.parameters);
     check_size(options, start, r);
-    for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, path + ": " + w.text});
+    for (const measurement::Warning& w : r.warnings) warnings.push_back({w.id, r.path + ": " + w.text});
     IdentificationData d = identification_data(r, inputs.options);
-    filter(options, path, d.record.data, warnings);
+    filter(options, r.path, d.record.data, warnings);
     inputs.data_sets.push_back(start.has_hysteresis ? without_mechanisms(start.cell, d) : d.record);
     inputs.soc_min = std::min(inputs.soc_min, d.soc_min);
     inputs.soc_max = std::max(inputs.soc_max, d.soc_max);
@@ -239,10 +238,13 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   grey_box.bounds = circuit_bounds(p.capacity_ah);
   grey_box.estimate_ocv_branch = !options.ocv_branch && !start.has_hysteresis && p.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = p.noise.voltage_v;
+  const auto started = id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds);
+  // an OCV from these voltages under load has no error of its own: it follows them
+  (options.ocv_from_load ? grey_box.ocv_hidden_v : grey_box.ocv_sigma_v) =
+      options.ocv_from_load ? start.ocv_error_v : ocv_sigma_v(start.ocv, started);
+  grey_box.ocv_ends_unmeasured = start.ocv.temperatures > 0;
   try {
-    result.identification =
-        id::identify_grey_box(id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds), main.data_sets,
-                              grey_box, options.method);
+    result.identification = id::identify_grey_box(started, main.data_sets, grey_box, options.method);
     if (!options.extend) {  // else the joint fit replaces it
       for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
     }
@@ -279,20 +281,6 @@ void write_sources(const IdentifyOptions& options, const IdentifyResult& result,
                       : fmt::format("model: residual of {}; current offset as in {}", validated_on, options.start));
 }
 
-/// Warns if [rc] is not at the temperature that the cell file states. identified_c: temperature of its recordings.
-/// moved: recordings at several temperatures have moved it there.
-void check_reference(const files::CellFile& cell, double identified_c, bool moved,
-                     std::vector<measurement::Warning>& warnings) {
-  constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
-  const double reference_c = cell.parameters.reference_temperature_c;
-  if (moved || std::abs(identified_c - reference_c) <= near_k) return;
-  warnings.push_back({"reference_temperature",
-                      fmt::format("R0, R1, C1 were identified at {:g} degrees C, but the reference temperature of the "
-                                  "cell file is {:g} degrees C; use --reference-temperature {:g}, or --extend with "
-                                  "recordings at several temperatures",
-                                  identified_c, reference_c, identified_c)});
-}
-
 /// One fit over all recordings, and the prediction of those that were held out.
 void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs, IdentifyResult& result,
                             files::CellFile& cell) {
@@ -301,8 +289,9 @@ void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs
     const IdentificationData& of = inputs.measured[k];
     recordings.push_back(joint_recording(inputs.recordings[k], of, of.record.initial_soc, cell.parameters.capacity_ah));
   }
-  JointResult joint = options.circuit ? identified_again(*options.circuit, recordings)
-                                      : identify_jointly(cell, covers_both_directions(recordings), recordings);
+  JointResult joint = options.circuit
+                          ? identified_again(*options.circuit, recordings)
+                          : identify_jointly(cell, covers_both_directions(recordings), recordings, options.rc_pairs);
   hold_out(options.hold_out, options.reading, inputs.options, cell, joint);
   for (const measurement::Warning& w : warnings_of(joint)) result.warnings.push_back(w);
   put(joint, cell);
@@ -311,6 +300,7 @@ void identify_joint_circuit(const IdentifyOptions& options, const Inputs& inputs
 
 void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, const Inputs& inputs,
                             IdentifyResult& result) {
+  report(options.progress, 0.05, "R0, R1, C1 over the state of charge");
   const double identified_c = fit_grey_box(options, start, inputs, result);
   if (!options.extend) {
     validate(
@@ -341,6 +331,7 @@ void identify_grey_box_cell(const IdentifyOptions& options, StartCell start, con
   }
   state_reference(cell, !options.ocv.empty());
   if (options.extend) {
+    report(options.progress, 0.1, "the circuit over all recordings");
     identify_joint_circuit(options, inputs, result, cell);
     const double fading = result.identification.fading;
     validate(
@@ -380,6 +371,7 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
   result.coulombic_efficiency = start.ocv.coulombic_efficiency;
   result.warnings = start.ocv.warnings;
   result.read_as = start.ocv.read_as;
+  report(options.progress, 0, "reading the recordings");
   const Inputs inputs = read_inputs(options, start, result.warnings, result.read_as);
   if (options.linear)
     identify_linear_cell(options, std::move(start), inputs, result);
@@ -392,6 +384,7 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
   }
   if (result.cell_file && result.joint)
     add_coverage(options.hold_out, options.reading, *result.cell_file, *result.joint);
+  report(options.progress, 1, "");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;
 }

@@ -13,6 +13,7 @@
 #include "workflow/cell_size.hpp"
 #include "workflow/identification_data.hpp"
 #include "workflow/joint_identification.hpp"
+#include "workflow/progress.hpp"
 
 namespace bms::workflow {
 
@@ -46,6 +47,7 @@ struct IdentifyOptions {
   std::optional<double> ocv_branch;               ///< branch position of the OCV, -1 discharge .. 1 charge; not given:
                                                   ///< identified if the data determine it
   bool extend = false;                            ///< add the mechanisms and error states that an estimator needs
+  std::optional<int> rc_pairs;                    ///< with `extend`: 1 or 2; not given: what predicts better
   std::optional<double> reference_temperature_c;  ///< of the cell file; not given: that of `start`
   double capacity_ah = 0;                         ///< 0: of the OCV recordings, else of `start`
   bool ocv_from_rests = false;                    ///< OCV from the rests of `recordings`
@@ -54,6 +56,7 @@ struct IdentifyOptions {
   StatedLimits limits;                            ///< what is not given is derived, if `start` is another cell
   std::string name;                               ///< of the cell
   std::string out;                                ///< file that the caller will write; used in messages only
+  Progress progress;                              ///< may be empty
 };
 
 struct IdentifyResult {

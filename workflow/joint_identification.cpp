@@ -112,7 +112,7 @@ bool covers_both_directions(const std::vector<id::JointRecording>& recordings) {
 }
 
 JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
-                             const std::vector<id::JointRecording>& recordings) {
+                             const std::vector<id::JointRecording>& recordings, std::optional<int> rc_pairs) {
   JointResult joint;
   joint.keeps_shape = keeps_shape;
   joint.temperatures = id::by_temperature(recordings).size();
@@ -120,7 +120,8 @@ JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
   model::CellParameters<> start = cell.parameters;
   if (!keeps_shape) flatten(start.rc);
   try {
-    const auto candidates = id::joint_candidates(start, without_circuit(cell, joint.temperatures > 1), recordings);
+    auto candidates = id::joint_candidates(start, without_circuit(cell, joint.temperatures > 1), recordings);
+    if (rc_pairs) std::erase_if(candidates, [&](const auto& c) { return c.rc_pairs != *rc_pairs; });
     joint.choice = id::choose_structure(candidates, recordings, {});
   } catch (const std::invalid_argument& error) {
     throw files::BadInput(recordings.front().name, 1, error.what());

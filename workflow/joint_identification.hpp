@@ -33,9 +33,11 @@ identification::JointRecording joint_recording(const measurement::Recording& rec
 /// True if charge and discharge cover half of the capacity each: only then is a shape over SOC not that of a direction.
 bool covers_both_directions(const std::vector<identification::JointRecording>& recordings);
 
-/// Chooses and fits the circuit. cell: OCV with its mechanisms, [rc] to start from. Throws BadInput.
+/// Chooses and fits the circuit. cell: OCV with its mechanisms, [rc] to start from. rc_pairs: 1 or 2; not given: what
+/// predicts better. Throws BadInput.
 JointResult identify_jointly(const files::CellFile& cell, bool keeps_shape,
-                             const std::vector<identification::JointRecording>& recordings);
+                             const std::vector<identification::JointRecording>& recordings,
+                             std::optional<int> rc_pairs = {});
 
 /// The circuit of `joint` fitted to other recordings of the same cell. Throws BadInput.
 JointResult identified_again(const JointResult& joint, const std::vector<identification::JointRecording>& recordings);

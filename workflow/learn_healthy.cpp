@@ -106,9 +106,15 @@ class Learning {
     double total_s = 0;
     for (const Recording& r : recordings_) total_s += r.duration_s();
     const double block_s = std::max(shortest_block_s, total_s / blocks_wanted);
-    for (std::size_t n = 0; n < recordings_.size(); ++n) add_blocks(n, block_s);
+    for (std::size_t n = 0; n < recordings_.size(); ++n) {
+      report(0.3, 0.6, n, recordings_.size(), "identified without", recordings_[n]);
+      add_blocks(n, block_s);
+    }
     std::vector<char> usable;
-    for (std::size_t b = 0; b < blocks_.size(); ++b) usable.push_back(diagnose(b) ? 1 : 0);
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      report(0.6, 1, b, blocks_.size(), "diagnosed", recordings_[blocks_[b].recording]);
+      usable.push_back(diagnose(b) ? 1 : 0);
+    }
     data_.known = true;
     if (!data_.blocks.empty()) {
       data_.regimes = regimes_.regimes(usable);
@@ -128,10 +134,17 @@ class Learning {
     files::CellFile cell;
   };
 
+  /// The k-th of `of` pieces between two shares of the whole identification.
+  void report(double from, double to, std::size_t k, std::size_t of, const char* what, const Recording& r) const {
+    workflow::report(options_.progress, from + (to - from) * static_cast<double>(k) / static_cast<double>(of),
+                     fmt::format("{} {}", what, std::filesystem::path(r.path).filename().string()));
+  }
+
   void add_blocks(std::size_t n, double block_s) {
     const Recording& whole = recordings_[n];
     const std::string& path = options_.healthy[n];
     IdentifyOptions without = options_;
+    without.progress = {};
     without.healthy.clear();
     without.circuit = circuit_;
     without.validate.clear();

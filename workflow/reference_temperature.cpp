@@ -1,5 +1,9 @@
 #include "workflow/reference_temperature.hpp"
 
+#include <cmath>
+
+#include <fmt/format.h>
+
 namespace bms::workflow {
 
 void state_reference(files::CellFile& cell, bool ocv_identified) {
@@ -10,6 +14,18 @@ void state_reference(files::CellFile& cell, bool ocv_identified) {
       if (info.parameter[k].is_reference_temperature) m.value[k] = cell.parameters.reference_temperature_c;
     }
   }
+}
+
+void check_reference(const files::CellFile& cell, double identified_c, bool moved,
+                     std::vector<measurement::Warning>& warnings) {
+  constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
+  const double reference_c = cell.parameters.reference_temperature_c;
+  if (moved || std::abs(identified_c - reference_c) <= near_k) return;
+  warnings.push_back({"reference_temperature",
+                      fmt::format("R0, R1, C1 were identified at {:g} degrees C, but the reference temperature of the "
+                                  "cell file is {:g} degrees C; use --reference-temperature {:g}, or --extend with "
+                                  "recordings at several temperatures",
+                                  identified_c, reference_c, identified_c)});
 }
 
 }  // namespace bms::workflow

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 #include <fmt/format.h>
@@ -121,6 +122,18 @@ StartCell read_start(const IdentifyOptions& options) {
   start.has_hysteresis = options.extend && !start.cell.mechanisms.empty();
   if (options.ocv_branch && p.ocv.half_gap_v.size > 0) p = identification::with_ocv_branch(p, *options.ocv_branch);
   return start;
+}
+
+/// Standard deviation of the branch position around its mean over a recording: uniform over half of the way to either
+/// branch.
+constexpr double branch_wanders = 0.29;
+
+double ocv_sigma_v(const OcvResult& ocv, const model::CellParameters<>& p) {
+  const double overvoltage_v =
+      ocv.coulombic_efficiency
+          ? branch_wanders * model::plateau_half_gap_v(p.ocv)
+          : ocv.largest_a * (identification::mean_of(p.rc.r0_ohm) + identification::mean_of(p.rc.r1_ohm));
+  return std::hypot(p.tolerance.ocv_v, overvoltage_v);
 }
 
 void adapt_start(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings,

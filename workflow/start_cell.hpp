@@ -26,6 +26,11 @@ struct StartCell {
 /// chemistry, makes it another cell. Throws BadInput; also if the OCV recordings contradict a stated capacity.
 StartCell read_start(const IdentifyOptions& options);
 
+/// Standard deviation of the OCV curve as an OCV: its error between points, and the overvoltage of a slow run. That of
+/// a charge and a discharge is what the branch position, which is estimated, may wander between them; that of a single
+/// run follows from R0 and R1 of `parameters`.
+double ocv_sigma_v(const OcvResult& ocv, const model::CellParameters<>& parameters);
+
 /// What follows from the recordings to identify from: limits of use of another cell, and the OCV from their rests.
 void adapt_start(const IdentifyOptions& options, const std::vector<measurement::Recording>& recordings,
                  StartCell& start, std::vector<measurement::Warning>& warnings);

@@ -286,6 +286,20 @@ TEST_F(IdentifyTool, AnExtendedFileLearnsWhatItLeavesUnexplainedOfItsOwnRecordin
       2);
 }
 
+TEST_F(IdentifyTool, HasAsManyRcPairsAsAskedFor) {
+  const std::string drive = recording_at(folder_.path().string(), 25),
+                    from = "--recording " + drive + " --initial-soc 0.6 --nodes 0.5 --no-healthy --rc ";
+  const json two = result(from + "2")["joint"];
+  ASSERT_EQ(two["candidates"].size(), 1U) << "--rc 2 needs no --extend";
+  EXPECT_EQ(two["candidates"][0]["name"], "two RC pairs");
+  EXPECT_THAT(content(path("cell.toml")), HasSubstr("[mechanism.slow_polarisation]"));
+  const json one = result(from + "1 --extend")["joint"];
+  ASSERT_EQ(one["candidates"].size(), 1U);
+  EXPECT_EQ(one["candidates"][0]["name"], "one RC pair");
+  EXPECT_THAT(content(path("cell.toml")), Not(HasSubstr("[mechanism.slow_polarisation]")));
+  EXPECT_TRUE(result(from + "1")["joint"].is_null()) << "one is what identify fits";
+}
+
 TEST_F(IdentifyTool, TheGeneratedHeaderHasTheReferenceTemperature) {
   const std::string start = content(std::filesystem::path(BMS_SOURCE_DIR) / "model/cells/table9.toml");
   const std::size_t after = start.find("capacity_ah");

@@ -150,6 +150,28 @@ TEST(Identify, InitialSocOnASlopeIsIdentified) {
   EXPECT_NEAR(found.initial[0].soc, 0.16, 0.01);
 }
 
+// An OCV that was taken from the same voltages moves its errors into R0 and R1, and out of the residuals.
+TEST(Identify, AnErrorThatTheResidualsDoNotShowKeepsNodesAlike) {
+  std::vector<experiments::ProfileRow> profile;
+  for (int k = 0; k < 2'700; ++k) profile.push_back({static_cast<double>(k), k % 90 < 60 ? -6.0 : 0.0});
+  const PlantRun run = run_plant(profile, 0.9);
+  std::mt19937_64 random(3);
+  DataSet r = record_of(run, 0.9);
+  r.data = noisy(run.data, random);
+  for (std::size_t k = 0; k < r.data.size(); ++k)
+    r.data.voltage_v.edit()[k] += 0.01 * std::sin(static_cast<double>(k) / 90);
+  const auto steps = [&](double hidden_v) {
+    GreyBoxOptions options;
+    options.soc_nodes = {0.4, 0.5, 0.6, 0.7, 0.8, 0.9};
+    options.ocv_hidden_v = hidden_v;
+    const auto& rc = identify_grey_box(table9(), {r}, options, Method::trust_region_reflective).cell.rc;
+    double sum = 0;
+    for (std::size_t k = 1; k < rc.soc.size; ++k) sum += std::pow(std::log(rc.r1_ohm[k] / rc.r1_ohm[k - 1]), 2);
+    return std::sqrt(sum);
+  };
+  EXPECT_LT(steps(0.03), 0.8 * steps(0));
+}
+
 TEST(Identify, RejectsARestAndNamesTheExperimentThatIsNeeded) {
   DataSet r;
   for (int k = 0; k < 600; ++k) {

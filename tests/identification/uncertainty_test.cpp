@@ -117,5 +117,19 @@ TEST(Residuals, PredictionUsesTheLastError) {
   EXPECT_NEAR(rms(prediction_error(slow, 5, f)), std::sqrt(1 - std::pow(0.9, 10)), 0.03);
 }
 
+// A column of the unmodelled is one standard deviation of something that moves the parameters.
+TEST(Uncertainty, IncludesWhatTheModelLacks) {
+  Eigen::MatrixXd jacobian(4, 2), unmodelled(4, 1);
+  jacobian << 2, 0, 2, 0, 0, 5, 0, 5;
+  unmodelled << 0.3, 0.3, 0.1, 0.4;
+  const Eigen::VectorXd residuals = Eigen::Vector4d(0.01, -0.01, 0.01, -0.01);
+  const Eigen::VectorXi free = Eigen::VectorXi::Zero(2);
+  const Uncertainty without = uncertainty(residuals, jacobian, 4, free, 0),
+                    with = uncertainty(residuals, jacobian, 4, free, 0, unmodelled);
+  EXPECT_NEAR(with.covariance(0, 0) - without.covariance(0, 0), 0.15 * 0.15, 1e-12);
+  EXPECT_NEAR(with.covariance(1, 1) - without.covariance(1, 1), 0.05 * 0.05, 1e-12);
+  EXPECT_NEAR(with.covariance(0, 1) - without.covariance(0, 1), 0.15 * 0.05, 1e-12);
+}
+
 }  // namespace
 }  // namespace bms::identification
