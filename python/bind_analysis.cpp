@@ -99,7 +99,7 @@ Diagnosed diagnose(const files::CellFile& cell, const Recordings& recordings, co
   options.initial_soc = initial_soc;
   workflow::DiagnoseResult result = workflow::diagnose_recordings(workflow::read_diagnose_input(options), search);
   workflow::add_next_experiment(options, result);
-  workflow::judge_holdouts(options, result);
+  workflow::judge_holdouts(options, search, result);
   return {files::parse_cell(files::cell_text(result.extended_cell), result.extended_cell.name),
           diagnosis::name_of(result.diagnosis.verdict), result.diagnosis.statement, reports::json_of(result),
           result.warnings};

@@ -204,7 +204,7 @@ class DiagnoseCommand final : public Command {
       result.warnings.push_back({"interrupted", "stopped by Ctrl-C: no cell file was written"});
     } else {
       workflow::add_next_experiment(o_, result);
-      workflow::judge_holdouts(o_, result);
+      workflow::judge_holdouts(o_, options, result);
       result.out = out_;
     }
     for (std::size_t k = said; k < result.warnings.size(); ++k) warn(result.warnings[k].text);

@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <Eigen/Core>
 
+#include "diagnosis/diagnose.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/quantity_text.hpp"
 #include "diagnosis/texts.hpp"
@@ -27,29 +31,44 @@ std::string interval_text(const diagnosis::Coverage& c) {
                      100 * diagnosis::nominal_coverage, 100 * c.share());
 }
 
-/// What the verdict says of a hold-out that it does not hold for.
-std::string consequence(const DiagnoseResult& r) {
+/// What the verdict says of a hold-out that it does not hold for. alone: its own diagnosis.
+std::string consequence(const DiagnoseResult& r, const std::optional<diagnosis::Diagnosis>& alone) {
   if (r.named()) return "the findings do not describe it.";
+  if (alone) return "alone it says that " + diagnosis::claim(alone->findings.front().setting) + ".";
   return "something is there that this recording does not show.";
 }
 
-/// Returns true if the prediction of a hold-out failed.
-bool is_beyond(const RecordingComparison& c, double noise_floor_v) {
-  if (!c.interval.coverage.is_beyond(noise_floor_v)) return false;
+/// What a hold-out says by itself, where nothing was found without it; nothing if it names no cause either. Errors
+/// that are no larger than the tolerance may still have the pattern of one cause.
+std::optional<diagnosis::Diagnosis> diagnosed_alone(diagnosis::Options how, const DiagnoseResult& r,
+                                                    const RecordingComparison& holdout) {
+  if (r.diagnosis.verdict != diagnosis::Verdict::no_mismatch) return std::nullopt;
+  how.healthy = r.cell.healthy;
+  diagnosis::Diagnosis d = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, {holdout.record}, how);
+  return diagnosis::names(d.verdict) ? std::optional(std::move(d)) : std::nullopt;
+}
+
+/// Returns true if the errors of a hold-out are larger than those of a right prediction.
+bool are_too_large(const RecordingComparison& c) {
   std::vector<double> errors;
   for (std::size_t k = 0; k < c.interval.sigma_v.size(); ++k)
     errors.push_back((c.record.voltage_v[k] - c.extended_v[k]) / c.interval.sigma_v[k]);
   return probability_of(errors) < false_alarms;
 }
 
-void add_contradiction(const DiagnoseOptions& options, DiagnoseResult& r) {
+void add_contradiction(const DiagnoseOptions& options, const diagnosis::Options& how, DiagnoseResult& r) {
   const diagnosis::Verdict verdict = r.diagnosis.verdict;
   if (!r.named() && !r.has_term() && verdict != diagnosis::Verdict::no_mismatch) return;  // nothing is stated of others
   const RecordingComparison* worst = nullptr;
+  std::optional<diagnosis::Diagnosis> worst_alone;
   for (const RecordingComparison& c : r.holdouts) {
-    if (!is_beyond(c, r.diagnosis.noise_floor_v)) continue;
+    if (!c.interval.coverage.is_beyond(r.diagnosis.noise_floor_v)) continue;
+    auto alone = diagnosed_alone(how, r, c);
+    if (!alone && !are_too_large(c)) continue;
     r.holdouts_beyond.push_back(c.record.name);
-    if (worst == nullptr || c.interval.coverage.error_v() > worst->interval.coverage.error_v()) worst = &c;
+    if (worst != nullptr && c.interval.coverage.error_v() <= worst->interval.coverage.error_v()) continue;
+    worst = &c;
+    worst_alone = std::move(alone);
   }
   if (worst == nullptr) return;
   r.together = together_command(options, r.recordings, r.holdouts);
@@ -59,7 +78,7 @@ void add_contradiction(const DiagnoseOptions& options, DiagnoseResult& r) {
     statement += "No action is needed for this recording.";
   }
   statement += fmt::format(" But the prediction of the hold-out {} is off by {}: {} Diagnose both together.",
-                           worst->record.name, interval_text(worst->interval.coverage), consequence(r));
+                           worst->record.name, interval_text(worst->interval.coverage), consequence(r, worst_alone));
 }
 
 /// The extended cell predicts the hold-outs worse.
@@ -103,8 +122,8 @@ double probability_of(std::span<const double> errors) {
   return std::erfc(away / std::sqrt(2)) / 2;
 }
 
-void judge_holdouts(const DiagnoseOptions& options, DiagnoseResult& r) {
-  add_contradiction(options, r);
+void judge_holdouts(const DiagnoseOptions& options, const diagnosis::Options& how, DiagnoseResult& r) {
+  add_contradiction(options, how, r);
   add_increase(r);
   add_soc_increase(r);
 }

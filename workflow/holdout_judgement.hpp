@@ -13,10 +13,10 @@ namespace bms::workflow {
 double probability_of(std::span<const double> errors);
 
 /// Judges each hold-out by the interval of its prediction and the noise floor. One that is beyond both contradicts the
-/// result, if such errors are as rare as a false alarm may be: the statement then says so, and what to do about it. The
-/// same if the extended cell predicts the hold-outs worse than the cell file does. It is written all the same, because
-/// a hold-out may be the one that is wrong (its start, its temperature); its `source` then says how it predicted them.
-/// options: those of this diagnosis.
-void judge_holdouts(const DiagnoseOptions& options, DiagnoseResult& result);
+/// result, if such errors are as rare as a false alarm may be, or if nothing was found and the hold-out alone has a
+/// cause: the statement then says so, and what to do about it. The same if the extended cell predicts the hold-outs
+/// worse than the cell file does. It is written all the same, because a hold-out may be the one that is wrong (its
+/// start, its temperature); its `source` then says how it predicted them. options, how: those of this diagnosis.
+void judge_holdouts(const DiagnoseOptions& options, const diagnosis::Options& how, DiagnoseResult& result);
 
 }  // namespace bms::workflow

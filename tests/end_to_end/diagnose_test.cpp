@@ -412,6 +412,20 @@ TEST_F(DiagnoseTool, AHoldOutThatThePredictionMissesChangesTheHeadline) {
   EXPECT_THAT(content(path("r.html")), HasSubstr("\"holdouts_beyond\":[\"later.csv\"]"));
 }
 
+/// A hold-out whose errors are within the tolerance, but in the pattern of one cause that the recording hides.
+TEST_F(DiagnoseTool, AHoldOutThatHasACauseAloneChangesTheHeadline) {
+  const auto part = [&](const std::string& name, const std::string& options) {
+    run_tool("simulate --cell table9 --with self_heating:thermal_resistance_k_per_w=8 --noise-v 0.001 --recording " +
+             shift + " " + options + " --out " + path(name));
+    return path(name);
+  };
+  const json r = result("--cell table9 --recording " + part("now.csv", "--initial-soc 0.98 --until 12000") +
+                        " --holdout " + part("later.csv", "--initial-soc 0.6 --from 12000 --until 24000"));
+  EXPECT_EQ(r["verdict"], "NO_MISMATCH");
+  EXPECT_EQ(r["holdouts_beyond"], json::array({"later.csv"}));
+  EXPECT_THAT(r["statement"].get<std::string>(), HasSubstr("alone it says that the cell is warmer inside"));
+}
+
 TEST_F(DiagnoseTool, AnExtendedFileThatPredictsTheHoldOutWorseSaysSo) {
   const json r =
       result("--cell table9 --initial-soc 0.98 --recording " + simulated("now.csv", "resistance_growth:fraction=0.3") +
