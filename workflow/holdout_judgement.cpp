@@ -34,7 +34,9 @@ std::string interval_text(const diagnosis::Coverage& c) {
 /// What the verdict says of a hold-out that it does not hold for. alone: its own diagnosis.
 std::string consequence(const DiagnoseResult& r, const std::optional<diagnosis::Diagnosis>& alone) {
   if (r.named()) return "the findings do not describe it.";
-  if (alone) return "alone it says that " + diagnosis::claim(alone->findings.front().setting) + ".";
+  if (alone && alone->verdict == diagnosis::Verdict::cause)
+    return "alone it says that " + diagnosis::claim(alone->findings.front().setting) + ".";
+  if (alone) return "alone it has causes, which are not clear enough to name them here.";
   return "something is there that this recording does not show.";
 }
 
