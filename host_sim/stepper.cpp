@@ -24,11 +24,14 @@ class SteppedEstimator final : public Stepper {
   Estimator estimator_;
 };
 
+using Laws = model::ChosenLaws<float>;
+/// Evaluated here: within the template below, g++ 14 has not yet instantiated the functions that it needs.
+constexpr std::size_t most_voltages = Laws::most_voltage_states;
+
 /// With as many states as the mechanisms of the cell have voltages.
 template <bool Errors, std::size_t Voltages = 0>
 std::unique_ptr<Stepper> extended(const Extended& cell, const std::optional<measurement::StartingPoint>& start) {
-  using Laws = model::ChosenLaws<float>;
-  if constexpr (Voltages < Laws::most_voltage_states) {
+  if constexpr (Voltages < most_voltages) {
     if (cell.laws.voltage_states() > Voltages) return extended<Errors, Voltages + 1>(cell, start);
   }
   using Estimator = estimator::SocEstimator<float, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>;
