@@ -239,9 +239,10 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   grey_box.estimate_ocv_branch = !options.ocv_branch && !start.has_hysteresis && p.ocv.half_gap_v.size > 0;
   grey_box.voltage_sigma_v = p.noise.voltage_v;
   const auto started = id::started_from_rests(p, main.data_sets.front().data, grey_box.bounds);
-  // an OCV from these voltages under load has no error of its own: it follows them
-  (options.ocv_from_load ? grey_box.ocv_hidden_v : grey_box.ocv_sigma_v) =
-      options.ocv_from_load ? start.ocv_error_v : ocv_sigma_v(start.ocv, started);
+  if (options.ocv_from_load)  // it follows the voltages of the fit
+    grey_box.ocv_hidden_v = start.ocv_error_v;
+  else
+    grey_box.ocv_sigma_v = ocv_sigma_v(start.ocv, started);
   grey_box.ocv_ends_unmeasured = start.ocv.temperatures > 0;
   try {
     result.identification = id::identify_grey_box(started, main.data_sets, grey_box, options.method);

@@ -2,7 +2,7 @@
 //
 //   identify_trials                 prints the table
 //   identify_trials --cells A-B     of these cells only, with a line for each trial
-//   identify_trials --family N        of other cells
+//   identify_trials --family N      of other cells
 //   identify_trials --write         writes the table into identification/README.md
 #include <algorithm>
 #include <cmath>
