@@ -8,7 +8,7 @@ namespace bms::identification {
 
 namespace {
 
-constexpr double tenth = 0.1;  // distance of the nodes of Table 9
+constexpr double node_distance = 0.1;  // distance of the nodes of Table 9
 
 /// A curve with independent steps of standard deviation `step` from node to node has second differences of
 /// sqrt(2) step. A parabola with the second difference d differs from its chord by d / 8 in the middle.
@@ -51,14 +51,14 @@ Eigen::MatrixXd changes_between_nodes(const GreyBox& grey_box, const Eigen::Vect
       return jacobian.col(quantity * fine_nodes + k).head(rows) * at[quantity * fine_nodes + k];
     };
     if (nodes == 1) {
-      const double rise = step_between(of, soc[0], soc[1]) * std::sqrt((soc[1] - soc[0]) / tenth);
+      const double rise = step_between(of, soc[0], soc[1]) * std::sqrt((soc[1] - soc[0]) / node_distance);
       changes.col(quantity).head(rows) = rise / 2 * (column(1) - column(0));
       continue;
     }
     for (Eigen::Index k = 0; k + 1 < nodes; ++k) {
       const auto below = static_cast<std::size_t>(2 * k);
       const double step =
-          step_between(of, soc[below], soc[below + 2]) * std::sqrt((soc[below + 2] - soc[below]) / tenth);
+          step_between(of, soc[below], soc[below + 2]) * std::sqrt((soc[below + 2] - soc[below]) / node_distance);
       changes.col(quantity * per_quantity + k).head(rows) = bulge(step) * column(2 * k + 1);
     }
   }

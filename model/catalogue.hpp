@@ -85,6 +85,14 @@ constexpr std::array<MechanismInfo, sizeof...(M)> infos(std::tuple<M...>*) {
   return {info<M>()...};
 }
 
+/// Place of a type in a tuple; its size if the type is not in it.
+template <class M, class Tuple>
+inline constexpr std::size_t place_in = 0;
+template <class M, class... Others>
+inline constexpr std::size_t place_in<M, std::tuple<M, Others...>> = 0;
+template <class M, class First, class... Others>
+inline constexpr std::size_t place_in<M, std::tuple<First, Others...>> = 1 + place_in<M, std::tuple<Others...>>;
+
 }  // namespace mechanism_detail
 
 inline constexpr std::array<MechanismInfo, mechanism_count> catalogue =
@@ -97,9 +105,10 @@ constexpr std::size_t mechanism_index(std::string_view id) {
   return k;
 }
 
-/// The same for its type.
+/// The same for its type. By the types alone: g++ 14 does not compare texts while it instantiates templates at the end
+/// of a source.
 template <class M>
-inline constexpr std::size_t mechanism_index_of = mechanism_index(M::id);
+inline constexpr std::size_t mechanism_index_of = mechanism_detail::place_in<M, Catalogue>;
 
 /// Calls f(std::type_identity<M>{}) for the mechanism M with this index; does nothing for an index beyond the
 /// catalogue.

@@ -18,23 +18,28 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
+constexpr const char* local_address = "127.0.0.1";  // the only one that the server is bound to
+
 thread_local bool refusing = false;  // the connection is one too many
+
+using Enqueued = decltype(std::declval<httplib::TaskQueue&>().enqueue(nullptr));  // void in 0.11, bool in 0.18
 
 /// A thread for each connection. A connection without a thread is run at once, and is then refused.
 class BoundedQueue : public httplib::TaskQueue {
  public:
-  void enqueue(std::function<void()> connection) override {
+  Enqueued enqueue(std::function<void()> connection) override {
     if (active_.fetch_add(1) >= BoundedServer::most_connections) {
       --active_;
       refusing = true;
       connection();
       refusing = false;
-      return;
+    } else {
+      threads_.enqueue([this, connection = std::move(connection)] {
+        connection();
+        --active_;
+      });
     }
-    threads_.enqueue([this, connection = std::move(connection)] {
-      connection();
-      --active_;
-    });
+    return static_cast<Enqueued>(true);
   }
   void shutdown() override { threads_.shutdown(); }
 
@@ -70,7 +75,7 @@ class Connection : public httplib::Stream {
 
  private:
   static void local(std::string& ip, int& port) {
-    ip = "127.0.0.1";
+    ip = local_address;
     port = 0;
   }
 
@@ -110,14 +115,22 @@ BoundedServer::BoundedServer() {
   new_task_queue = [] { return new BoundedQueue; };  // NOLINT(cppcoreguidelines-owning-memory): the server owns it
 }
 
+template <class Own>
+bool BoundedServer::answer(Own& server, httplib::Stream& connection) {
+  bool closed = false;
+  if constexpr (requires { server.process_request(connection, true, closed, nullptr); })  // cpp-httplib 0.11
+    return server.process_request(connection, true, closed, nullptr);
+  else
+    return server.process_request(connection, local_address, 0, local_address, 0, true, closed, nullptr);
+}
+
 bool BoundedServer::process_and_close_socket(socket_t socket) {
   bool done = false;
   std::string head;
   const Head read = refusing ? Head::missing : read_head(socket, svr_sock_, head);
   if (read == Head::complete) {
     Connection connection(socket, std::move(head));
-    bool closed = false;
-    done = process_request(connection, true, closed, nullptr);
+    done = answer(*this, connection);
   } else if (read == Head::too_long) {
     constexpr std::string_view answer =
         "HTTP/1.1 431 Request Header Fields Too Large\r\nConnection: close\r\nContent-Length: 0\r\n\r\n";

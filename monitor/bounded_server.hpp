@@ -27,6 +27,9 @@ class BoundedServer : public httplib::Server {
   BoundedServer();
 
  private:
+  /// Own: this class, whose base has another function in cpp-httplib 0.18 than in 0.11.
+  template <class Own>
+  static bool answer(Own& server, httplib::Stream& connection);
   bool process_and_close_socket(socket_t socket) override;
 };
 

@@ -29,9 +29,9 @@ struct Knowledge<model::InitialSoc> : DefaultKnowledge<model::InitialSoc> {
     return std::nullopt;
   }
   /// Far starts, and the one that the recording states elsewhere.
-  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& facts) {
+  static std::vector<std::vector<double>> far_starts(const MechanismSetting&, const RecordingFacts& recording) {
     std::vector<std::vector<double>> starts = {{-0.15}, {-0.08}, {-0.04}, {0.04}, {0.08}, {0.15}};
-    if (facts.start_shift) starts.push_back({*facts.start_shift});
+    if (recording.start_shift) starts.push_back({*recording.start_shift});
     return starts;
   }
   /// The true start is any state of charge, whatever was given.

@@ -105,7 +105,7 @@ TEST(Hypothesis, AFullCellBeginsOnItsChargeBranchAndLeavesItWithTheCharge) {
     return with.voltage(with.base(), with.unchanged(), record)[row] -
            without.voltage(without.base(), without.unchanged(), record)[row];
   };
-  for (const std::size_t full : {0, 2}) {
+  for (const std::size_t full : {0U, 2U}) {
     EXPECT_NEAR(branch_v(full, 0), half_gap_v, 1e-9);
     EXPECT_NEAR(branch_v(full, 100), half_gap_v * (1 - decay * moved), 1e-4);
   }

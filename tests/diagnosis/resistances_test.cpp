@@ -75,7 +75,7 @@ TEST(Resistances, AreArrheniusTimesTheSizeAtTheReference) {
     EXPECT_NEAR(d.resistances->temperature_c, cold_c, 1e-9);
     EXPECT_EQ(d.resistances->reference_c, 25);
     EXPECT_EQ(d.resistances->step_s, 1);
-    const ResistanceAt& own = named(d.findings[0].resistances, "resistance_ohm");
+    const ResistanceAt own = named(d.findings[0].resistances, "resistance_ohm");
     EXPECT_NEAR(own.here.ohm, 0.002 * factor, 1e-6);
     const double by_ohm = factor * 0.0006, by_energy = 0.002 * factor * per_energy * 6'000;
     EXPECT_NEAR(own.here.std_ohm,
@@ -83,10 +83,10 @@ TEST(Resistances, AreArrheniusTimesTheSizeAtTheReference) {
     ASSERT_TRUE(own.reference.has_value());
     EXPECT_NEAR(own.reference->ohm, 0.002, 1e-9);
     EXPECT_NEAR(own.reference->std_ohm, 0.0006, 1e-9);
-    const ResistanceAt& r0 = named(d.resistances->cell, "r0_ohm");
+    const ResistanceAt r0 = named(d.resistances->cell, "r0_ohm");
     const double r0_factor = 0.7 + 0.3 * std::exp(45'000 * per_energy);
     EXPECT_NEAR(r0.here.ohm / r0.reference->ohm, r0_factor, 1e-3);
-    const ResistanceAt& added = named(d.findings[1].resistances, "added_r0_ohm");
+    const ResistanceAt added = named(d.findings[1].resistances, "added_r0_ohm");
     EXPECT_NEAR(added.here.ohm, r0.here.ohm - r0.reference->ohm, 1e-9);
     EXPECT_NEAR(added.reference->ohm, 0, 1e-12);
     // of a step of a second: R0, and of the fast polarisation 1 - exp(-1 / 1.5)
@@ -143,7 +143,7 @@ TEST(Resistances, R0InTheColdIsThePlants) {
   double true_ohm = 0;
   const Diagnosis d = diagnose(test::table9(), {}, {of_plant(0, 31, true_ohm)});
   ASSERT_TRUE(d.resistances.has_value()) << name_of(d.verdict) << d.statement;
-  const ResistanceAt& r0 = named(d.resistances->cell, "r0_ohm");
+  const ResistanceAt r0 = named(d.resistances->cell, "r0_ohm");
   EXPECT_NEAR(r0.here.ohm, true_ohm, 3 * r0.here.std_ohm);
   EXPECT_LT(r0.here.std_ohm, 0.05 * true_ohm);
   ASSERT_TRUE(r0.reference.has_value());

@@ -135,7 +135,7 @@ std::vector<dp::CellFit> cells_with(const dp::Matrix& information, dp::Parameter
   for (std::size_t c = 0; c < fits.size(); ++c) {
     dp::Information all;
     all.of_parameters = information;
-    if (c == 1) all.with_data = information.col(which) * size;
+    if (c == 1) all.with_data = information.col(static_cast<Eigen::Index>(which)) * size;
     fits[c].until = {all};
   }
   return fits;

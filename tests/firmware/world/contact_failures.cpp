@@ -79,7 +79,7 @@ std::vector<Failure> contactor_failures() {
     list.push_back({fmt::format("{} three times as slow", name),
                     before_start,
                     either,
-                    [relay = relay](TruckWorld& w) { w.truck.contactor(relay).set_slowness(3); },
+                    [slow = relay](TruckWorld& w) { w.truck.contactor(slow).set_slowness(3); },
                     {},
                     "slow, but it switches"});
   }

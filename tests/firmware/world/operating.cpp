@@ -77,8 +77,8 @@ WorldSetup typical_setup(const Pack& pack, std::uint64_t seed) {
 }
 
 const char* name_of(Operating state) {
-  constexpr std::array names{"off", "standby", "drive", "recuperation", "charge"};
-  return names[static_cast<std::size_t>(state)];
+  constexpr std::array states{"off", "standby", "drive", "recuperation", "charge"};
+  return states[static_cast<std::size_t>(state)];
 }
 
 void set_drive_a(TruckWorld& world, double current_a) {
