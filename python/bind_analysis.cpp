@@ -3,7 +3,7 @@
 
 #include "files/bad_input.hpp"
 #include "python/bindings.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_cell.hpp"
 #include "workflow/diagnose_recordings.hpp"
 #include "workflow/holdout_judgement.hpp"
 #include "workflow/identify_cell.hpp"

@@ -2,8 +2,8 @@
 #include "diagnosis/texts.hpp"
 #include "diagnosis/withheld_text.hpp"
 #include "reports/detectability.hpp"
+#include "reports/json_cell.hpp"
 #include "reports/json_parts.hpp"
-#include "reports/json_results.hpp"
 #include "workflow/diagnosis_comparison.hpp"
 
 namespace bms::reports {

@@ -1,5 +1,5 @@
+#include "reports/json_study.hpp"
 #include "reports/json_parts.hpp"
-#include "reports/json_results.hpp"
 
 namespace bms::reports {
 

@@ -23,4 +23,6 @@ struct AgainstOptions {
 /// Returns the exit code: 0 if both firmwares publish the same over the whole log, else 1.
 int run_against(const AgainstOptions& options);
 
+using RunAgainst = int (*)(const AgainstOptions&);
+
 }  // namespace bms::tool

@@ -1,7 +1,9 @@
 // One subcommand of the command line.
 #pragma once
 
-#include <CLI/CLI.hpp>
+namespace CLI {
+class App;
+}
 
 namespace bms::tool {
 

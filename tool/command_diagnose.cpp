@@ -10,7 +10,7 @@
 #include "files/bad_input.hpp"
 #include "reports/diagnosis_charts.hpp"
 #include "reports/diagnosis_page.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_cell.hpp"
 #include "reports/pack_results.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"

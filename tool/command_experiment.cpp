@@ -8,7 +8,7 @@
 #include "experiments/experiment.hpp"
 #include "experiments/profile_figures.hpp"
 #include "files/bad_input.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_replay.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"

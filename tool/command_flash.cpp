@@ -1,5 +1,6 @@
 // bms flash: builds a board's image and writes it onto the chip with OpenOCD.
 #include <fmt/format.h>
+#include <CLI/CLI.hpp>
 
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"

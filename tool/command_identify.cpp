@@ -9,7 +9,7 @@
 #include "files/recording.hpp"
 #include "reports/identify_page.hpp"
 #include "reports/identify_tables.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_cell.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/progress.hpp"

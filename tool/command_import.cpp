@@ -9,7 +9,7 @@
 #include "files/recording.hpp"
 #include "files/recording_text.hpp"
 #include "measurement/recording_checks.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_replay.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
 #include "tool/recording_part.hpp"

@@ -6,7 +6,7 @@
 
 #include "files/bad_input.hpp"
 #include "proof/proof.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_study.hpp"
 #include "reports/proof_page.hpp"
 #include "reports/proof_table.hpp"
 #include "tool/commands.hpp"

@@ -14,7 +14,7 @@
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
 #include "measurement/recording_checks.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_replay.hpp"
 #include "reports/report_page.hpp"
 #include "tool/against.hpp"
 #include "tool/commands.hpp"
@@ -286,6 +286,8 @@ int run_cut_trials(const ReplayOptions& options) {
 
 class ReplayCommand final : public Command {
  public:
+  explicit ReplayCommand(RunAgainst run_against) : run_against_(run_against) {}
+
   CLI::App* add(CLI::App& app) override {
     CLI::App& c = *app.add_subcommand(
         "replay", "Run the state-of-charge estimator over a recording, on this computer or on an emulated board");
@@ -335,7 +337,7 @@ class ReplayCommand final : public Command {
     complete_reading(o_.reading);
     o_.output.set_own(o_.trace);
     o_.output.protect({o_.recording, o_.cell, o_.board_cell, o_.against.new_cell});
-    if (!o_.against.firmware.empty()) return run_against(against());
+    if (!o_.against.firmware.empty()) return run_against_(against());
     if (o_.cuts > 0) return run_cut_trials(o_);
     ReplayRun run = read(o_);
     compute(o_, run);
@@ -375,11 +377,12 @@ class ReplayCommand final : public Command {
     return a;
   }
 
+  RunAgainst run_against_;
   ReplayOptions o_;
 };
 
 }  // namespace
 
-std::unique_ptr<Command> replay_command() { return std::make_unique<ReplayCommand>(); }
+std::unique_ptr<Command> replay_command(RunAgainst against) { return std::make_unique<ReplayCommand>(against); }
 
 }  // namespace bms::tool

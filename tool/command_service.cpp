@@ -21,7 +21,7 @@ namespace {
 
 using namespace monitor;
 
-constexpr int wait_ms = 50;
+constexpr int read_wait_ms = 50;
 
 struct ServiceOptions {
   std::string source, key, what;
@@ -104,7 +104,7 @@ class ServiceCommand final : public Command {
         return false;
       }
       if (client.state() != ServiceClient::State::working) break;
-      const std::size_t n = source.read(room, wait_ms);
+      const std::size_t n = source.read(room, read_wait_ms);
       for (std::size_t k = 0; k < n; ++k) {
         if (room[k].kind == FrameKind::standard) client.receive(to_can_frame(room[k]), now_s());
       }

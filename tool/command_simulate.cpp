@@ -16,7 +16,7 @@
 #include "host_sim/simulation.hpp"
 #include "host_sim/simulation_result.hpp"
 #include "measurement/recording_checks.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_cell.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"

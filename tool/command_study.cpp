@@ -9,7 +9,7 @@
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
 #include "files/committed_figures.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_study.hpp"
 #include "reports/report_page.hpp"
 #include "study/diagnose_paper.hpp"
 #include "study/study.hpp"

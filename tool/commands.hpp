@@ -3,12 +3,14 @@
 
 #include <memory>
 
+#include "tool/against.hpp"
 #include "tool/command.hpp"
 
 namespace bms::tool {
 
-std::unique_ptr<Command> import_command();      ///< a log of a tester, a logger or a CAN bus as a recording
-std::unique_ptr<Command> replay_command();      ///< estimates for a recording, on the host or an emulated board
+std::unique_ptr<Command> import_command();  ///< a log of a tester, a logger or a CAN bus as a recording
+/// Estimates for a recording, on the host or an emulated board; against: of two firmwares on one log.
+std::unique_ptr<Command> replay_command(RunAgainst against);
 std::unique_ptr<Command> simulate_command();    ///< model voltage for a current, open loop
 std::unique_ptr<Command> experiment_command();  ///< a current profile by name
 std::unique_ptr<Command> identify_command();    ///< recordings in, cell file out

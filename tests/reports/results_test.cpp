@@ -4,7 +4,7 @@
 
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
-#include "reports/json_results.hpp"
+#include "reports/json_replay.hpp"
 #include "reports/report_page.hpp"
 
 namespace bms::reports {

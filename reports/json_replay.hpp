@@ -1,0 +1,21 @@
+// Results of the commands that need no identification as JSON objects. Their names are relied on from outside.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "experiments/profile_figures.hpp"
+#include "host_sim/cuts.hpp"
+#include "host_sim/replay.hpp"
+
+namespace bms::reports {
+
+std::string json_of(const host_sim::ReplayResult& result, const std::string& trace_sha256);
+std::string json_of(const host_sim::CutResult& result);
+/// Of bms import; out: the file that was written, or empty.
+std::string json_of(const measurement::Recording& recording, const std::string& out);
+/// Of bms cell.
+std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts);
+std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
+
+}  // namespace bms::reports
