@@ -450,6 +450,11 @@ void write_accuracy() {
   files::replace_figures(source / "estimator/README.md", "duty", thousand_hours());
 }
 
+/// On recordings that are not part of the project.
+void write_real_identification() {
+  files::replace_figures(source / "identification/README.md", "real", real_identification());
+}
+
 void write_identification() {
   constexpr std::uint64_t bands_seed = 901;
   const auto readme = source / "identification/README.md";
@@ -468,8 +473,7 @@ void run() {
     fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
   }
   files::replace_figures(source / "host_sim/README.md", "speed", speed());
-  if (std::filesystem::exists(data))
-    files::replace_figures(source / "identification/README.md", "real", real_identification());
+  if (std::filesystem::exists(data)) write_real_identification();
   write_identification();
 }
 
@@ -498,6 +502,8 @@ int main(int argc, char** argv) {
       bms::files::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
     else if (argc > 1 && std::string_view(argv[1]) == "identification")
       bms::write_identification();
+    else if (argc > 1 && std::string_view(argv[1]) == "real")
+      bms::write_real_identification();
     else
       bms::run();
     return 0;
