@@ -78,7 +78,7 @@ TextTable::TextTable(const std::string& text, const std::string& path) {
   }
 }
 
-const TextTable& text_table(const std::string& name) {
+const TextTable& text_table(const char* name) {
   static const std::map<std::string, TextTable> tables = [] {
     std::map<std::string, TextTable> all;
     for (const PaperTableText& file : paper_table_texts()) {

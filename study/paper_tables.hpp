@@ -38,7 +38,7 @@ class TextTable {
 };
 
 /// "statements", "errata" or "audit". Throws std::out_of_range for other names.
-const TextTable& text_table(const std::string& name);
+const TextTable& text_table(const char* name);
 
 /// Table 1 and 4 to 9. Throws std::out_of_range for other numbers.
 const PaperTable& paper_table(int number);

@@ -1,4 +1,4 @@
-// bms with the commands that need no identification: from a checkout they are ready in a quarter of the time.
+// bms with the commands that need no identification: from a checkout they do not wait for it.
 #include "files/bad_input.hpp"
 #include "tool/command_line.hpp"
 #include "tool/commands.hpp"
