@@ -73,6 +73,20 @@ TEST_F(Wrapper, HelpListsEveryCommandOfItsOwnAndNoOther) {
   EXPECT_EQ(listed(run("help")), known);
 }
 
+/// What the wrapper builds for a command is next to the whole tool.
+TEST_F(Wrapper, TheProgramThatIsBuiltForACommandHasIt) {
+  for (const std::string program : {"bms_replay", "bms_cells"}) {
+    const Names of_wrapper = matches(content(wrapper), "^    ([a-z |]+)[)] echo " + program + " ");
+    ASSERT_EQ(of_wrapper.size(), 1U) << program;
+    const auto out = folder_.path() / "help";
+    const auto path = std::filesystem::path(BMS_TOOL).parent_path() / program;
+    ASSERT_EQ(std::system((path.string() + " --help >" + out.string()).c_str()), 0);
+    const Names commands = listed(content(out));
+    EXPECT_GE(commands.size(), 3U);
+    EXPECT_EQ(matches(*of_wrapper.begin(), "([a-z]+)"), commands) << program;
+  }
+}
+
 TEST_F(Wrapper, HelpInstallsAndBuildsNothing) {
   const std::string help = run("help");
   for (const char* arguments : {"", "--help", "-h"}) EXPECT_EQ(run(arguments), help) << arguments;
