@@ -14,6 +14,8 @@ namespace bms::monitor {
 
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 constexpr std::uint32_t processor_fault = 128, numbers = 256;
 
 double value_of(const BusState& bus, std::string_view message, std::string_view signal) {
@@ -210,7 +212,6 @@ std::string csv_of(const StoredData& data) {
 }
 
 std::string json_of(const StoredData& data, const std::string& source) {
-  using Json = nlohmann::ordered_json;
   const auto number = [](double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); };
   Json faults = Json::array();
   for (const StoredFault& f : data.stored_faults()) {
