@@ -95,7 +95,7 @@ TEST_F(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
              monitored_sigma = column(folder.path() / "rows.csv", "PackState.SocSigma [%]");
   ASSERT_EQ(soc.size(), samples);
   ASSERT_EQ(monitored.size(), samples);
-  for (int k = 0; k < samples; ++k) {
+  for (std::size_t k = 0; k < soc.size(); ++k) {
     ASSERT_NEAR(monitored[k], 100 * soc[k], 0.00101) << k;
     ASSERT_NEAR(monitored_sigma[k], 100 * sigma[k], 0.00101) << k;
   }
