@@ -93,26 +93,6 @@ std::string json_of(const measurement::Recording& r, const std::string& out) {
                   {"warnings", warnings_of(r.warnings)}});
 }
 
-std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts) {
-  const model::CellParameters<>& p = cell.parameters;
-  Json nodes = Json::array();
-  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
-    nodes.push_back(
-        {{"soc", p.rc.soc[k]}, {"r0_ohm", p.rc.r0_ohm[k]}, {"r1_ohm", p.rc.r1_ohm[k]}, {"c1_f", p.rc.c1_f[k]}});
-  }
-  return text_of({{"command", "cell"},
-                  {"cell", cell.name},
-                  {"chemistry", cell.chemistry},
-                  {"capacity_ah", p.capacity_ah},
-                  {"limits",
-                   {{"voltage_min_v", p.limits.voltage_min_v},
-                    {"voltage_max_v", p.limits.voltage_max_v},
-                    {"charge_current_max_a", p.limits.charge_current_max_a},
-                    {"discharge_current_max_a", p.limits.discharge_current_max_a}}},
-                  {"rc", nodes},
-                  {"doubts", doubts}});
-}
-
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& f) {
   return text_of({{"command", "experiment"},
                   {"name", experiment},

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <string>
-#include <vector>
 
 #include "experiments/profile_figures.hpp"
 #include "host_sim/cuts.hpp"
@@ -14,8 +13,6 @@ std::string json_of(const host_sim::ReplayResult& result, const std::string& tra
 std::string json_of(const host_sim::CutResult& result);
 /// Of bms import; out: the file that was written, or empty.
 std::string json_of(const measurement::Recording& recording, const std::string& out);
-/// Of bms cell.
-std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts);
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& figures);
 
 }  // namespace bms::reports

@@ -10,7 +10,7 @@
 #include "files/cell_file.hpp"
 #include "files/cell_header.hpp"
 #include "reports/cell_charts.hpp"
-#include "reports/json_replay.hpp"
+#include "reports/json_cell.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
