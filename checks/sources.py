@@ -21,10 +21,11 @@ HASH_PARTS = re.compile(r'''
 
 
 def paths(root, endings):
-    """Sorted paths, relative to root, of all files with one of these endings. Leaves out hidden and build folders."""
+    """Sorted paths, relative to root, of all files with one of these endings. Leaves out folders that are hidden, of a
+    build, or generated."""
     found = []
     for folder, folders, names in os.walk(root):
-        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in ("build", "__pycache__")
+        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in ("build", "generated", "__pycache__")
                             and not os.path.exists(os.path.join(folder, f, "CMakeCache.txt")))
         found += [os.path.relpath(os.path.join(folder, n), root) for n in names if n.endswith(tuple(endings))]
     return sorted(found)

@@ -1,35 +1,28 @@
-# Generates the packing code of the CAN messages in ${PROJECT_BINARY_DIR}/generated:
+# The packing code of the CAN messages, generated from the DBC files by ./bms messages and committed, so that a build
+# needs no canmatrix:
 #
-#   can/greybox_bms.dbc      can_messages.hpp
-#   can/j1939_profile.dbc    j1939_messages.hpp
+#   can/greybox_bms.dbc      can/generated/can_messages.hpp
+#   can/j1939_profile.dbc    can/generated/j1939_messages.hpp
 #
 # Link bms_can to include them.
-find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH DOC "python3 with canmatrix")
+find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
 if(NOT BMS_PYTHON)
   find_program(BMS_PYTHON python3 REQUIRED)
 endif()
-execute_process(COMMAND ${BMS_PYTHON} -c "import canmatrix" OUTPUT_QUIET ERROR_QUIET RESULT_VARIABLE no_canmatrix)
-if(no_canmatrix)
-  message(FATAL_ERROR "${BMS_PYTHON} cannot import canmatrix, which generates the CAN messages. "
-    "Install it (Debian: python3-canmatrix).")
-endif()
 
-# bms_dbc_header(OUT IN [NAMESPACE]): OUT is the header, IN the DBC file, NAMESPACE inside bms::can
-function(bms_dbc_header out in)
-  set(generators ${PROJECT_SOURCE_DIR}/cmake/dbc_header.py ${PROJECT_SOURCE_DIR}/cmake/dbc_file.py)
-  get_filename_component(name ${in} NAME)
-  add_custom_command(OUTPUT ${out}
-    COMMAND ${BMS_PYTHON} ${PROJECT_SOURCE_DIR}/cmake/dbc_header.py ${in} ${out} ${ARGN}
-    DEPENDS ${generators} ${in}
-    COMMENT "CAN messages of ${name}" VERBATIM)
+# The header knows the DBC file that it was generated from: a changed one is not used in silence.
+function(bms_check_messages header dbc)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${dbc} ${header})
+  file(SHA256 ${dbc} sha256)
+  file(STRINGS ${header} generated_from LIMIT_COUNT 1 REGEX "SHA-256 of that file: ${sha256}")
+  if(NOT generated_from)
+    message(FATAL_ERROR "${header} was generated from another ${dbc}; ./bms messages writes it again.")
+  endif()
 endfunction()
 
-file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/generated)
-set(can_messages ${PROJECT_BINARY_DIR}/generated/can_messages.hpp)
-set(j1939_messages ${PROJECT_BINARY_DIR}/generated/j1939_messages.hpp)
-bms_dbc_header(${can_messages} ${PROJECT_SOURCE_DIR}/can/greybox_bms.dbc)
-bms_dbc_header(${j1939_messages} ${PROJECT_SOURCE_DIR}/can/j1939_profile.dbc j1939)
-add_custom_target(generate_can_messages DEPENDS ${can_messages} ${j1939_messages})
+set(can_messages ${PROJECT_SOURCE_DIR}/can/generated/can_messages.hpp)
+set(j1939_messages ${PROJECT_SOURCE_DIR}/can/generated/j1939_messages.hpp)
+bms_check_messages(${can_messages} ${PROJECT_SOURCE_DIR}/can/greybox_bms.dbc)
+bms_check_messages(${j1939_messages} ${PROJECT_SOURCE_DIR}/can/j1939_profile.dbc)
 add_library(bms_can INTERFACE)
-target_include_directories(bms_can INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_BINARY_DIR}/generated)
-add_dependencies(bms_can generate_can_messages)
+target_include_directories(bms_can INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/can/generated)

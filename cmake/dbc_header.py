@@ -9,6 +9,7 @@ unpacked by can/codec.hpp. Needs python3-canmatrix.
 * The codec fills in the signals Crc and Counter; they are not values. A message without them and without a data id is
   not protected, and its unused bits are 1, as J1939 requires.
 """
+import hashlib
 import os
 import re
 import sys
@@ -119,7 +120,10 @@ def main():
     source, target = sys.argv[1:3]
     namespace = "bms::can" + "".join("::" + word for word in sys.argv[3:])
     frames = load(source).frames
-    lines = [f"// Generated from {os.path.basename(source)}. Do not edit.", "#pragma once", ""]
+    with open(source, "rb") as dbc:
+        sha256 = hashlib.sha256(dbc.read()).hexdigest()
+    lines = [f"// Generated from {os.path.basename(source)} by ./bms messages. Do not edit.",
+             f"// SHA-256 of that file: {sha256}", "#pragma once", ""]
     lines += [f"#include <{name}>" for name in ("array", "cstdint", "span", "tuple")]
     lines += ["", '#include "can/codec.hpp"', "", f"namespace {namespace} {{", ""]
     for frame in frames:
