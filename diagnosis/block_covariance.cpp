@@ -8,7 +8,7 @@
 #include "diagnosis/fit_parameters.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/products.hpp"
-#include "measurement/symmetric_eigen.hpp"
+#include "linear_algebra/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -32,8 +32,8 @@ Eigen::MatrixXd factor_of(const Eigen::MatrixXd& covariance) {
   if (root.info() == Eigen::Success) return root.matrixL();
   const Eigen::VectorXd variance = covariance.diagonal().cwiseAbs(),
                         unit = (variance.array() > 0).select(variance.cwiseSqrt(), 1.0);
-  const measurement::SymmetricEigen axes =
-      measurement::symmetric_eigen(unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal());
+  const linear_algebra::SymmetricEigen axes =
+      linear_algebra::symmetric_eigen(unit.cwiseInverse().asDiagonal() * covariance * unit.cwiseInverse().asDiagonal());
   return unit.asDiagonal() * axes.vectors * axes.values.cwiseMax(numerics.fit.ridge).cwiseSqrt().asDiagonal();
 }
 
@@ -45,12 +45,12 @@ Eigen::MatrixXd with_prior(const Eigen::MatrixXd& covariance, const Eigen::Vecto
   // in coordinates in which the covariance of the fit is 1: data + rest = 1
   const Eigen::MatrixXd l = factor_of(covariance);
   const Eigen::MatrixXd rest = l.transpose() * prior.asDiagonal() * l;
-  const measurement::SymmetricEigen known = measurement::symmetric_eigen(rest);
+  const linear_algebra::SymmetricEigen known = linear_algebra::symmetric_eigen(rest);
   const Eigen::VectorXd share = (1 - known.values.array()).cwiseMax(numerics.fit.ridge);  // known from data
   const Eigen::MatrixXd data_root = known.vectors * share.cwiseSqrt().asDiagonal();
   const Eigen::MatrixXd back = share.cwiseSqrt().cwiseInverse().asDiagonal() * known.vectors.transpose();
   const Eigen::MatrixXd turned = back * l.transpose();
-  const measurement::SymmetricEigen spread = measurement::symmetric_eigen(turned * pulls * turned.transpose());
+  const linear_algebra::SymmetricEigen spread = linear_algebra::symmetric_eigen(turned * pulls * turned.transpose());
   const Eigen::VectorXd weaker = spread.values.cwiseMax(1).cwiseInverse();
   const Eigen::MatrixXd data = data_root * spread.vectors;
   const Eigen::MatrixXd precision = data * weaker.asDiagonal() * data.transpose() + rest;

@@ -1,4 +1,5 @@
 // Derivatives of the predicted voltage: dual numbers through the simulation.
+#include <algorithm>
 #include <array>
 
 #include "arithmetic/dual_number.hpp"
@@ -10,7 +11,7 @@ namespace bms::diagnosis {
 namespace {
 
 /// Derivatives that go through the simulation at once.
-enum : std::size_t { few_lanes = 4, many_lanes = 8, most_lanes = 12 };
+enum : std::size_t { few_lanes = 4, many_lanes = 8 };  // each takes ten seconds to compile
 using arithmetic::whole_registers;
 
 /// The base parameters for derivatives along one row: a lane per lever, then one per state as it was before the row.
@@ -149,13 +150,11 @@ Columns LikelihoodModel::derivatives(const Hypothesis& h, const Eigen::VectorXd&
   Columns columns(static_cast<Eigen::Index>(samples()), static_cast<Eigen::Index>(by.size()));
   if (by.empty()) return columns;
   for (std::size_t first = 0; first < by.size();) {
-    const std::size_t left = by.size() - first, here = left <= most_lanes ? left : many_lanes;
+    const std::size_t here = std::min<std::size_t>(by.size() - first, many_lanes);
     if (here <= few_lanes)
       derive<few_lanes>(h, u, by, first, here, columns);
-    else if (here <= many_lanes)
-      derive<many_lanes>(h, u, by, first, here, columns);
     else
-      derive<most_lanes>(h, u, by, first, here, columns);
+      derive<many_lanes>(h, u, by, first, here, columns);
     first += here;
   }
   whiten(columns);

@@ -10,6 +10,7 @@
 #include "diagnosis/mechanism.hpp"
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis {
@@ -47,7 +48,7 @@ Fit fit_of(const Difference& d, const std::vector<std::size_t>& chosen, const Ei
     for (std::size_t k = 0; k < chosen.size(); ++k)
       columns.col(static_cast<Eigen::Index>(k)) = d.effects[chosen[k]].by_row;
     const Eigen::MatrixXd weighted = weight.asDiagonal() * columns;
-    fit.strength = weighted.colPivHouseholderQr().solve(weight.cwiseProduct(d.error));
+    fit.strength = linear_algebra::solve_least_squares(weighted, weight.cwiseProduct(d.error));
     fit.residual -= columns * fit.strength;
   }
   fit.cost = weight.cwiseProduct(fit.residual).squaredNorm();

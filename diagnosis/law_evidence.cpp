@@ -11,9 +11,9 @@
 #include "diagnosis/law_thresholds.hpp"
 #include "diagnosis/residual_projection.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "linear_algebra/symmetric_eigen.hpp"
 #include "measurement/in_parallel.hpp"
 #include "measurement/statistics.hpp"
-#include "measurement/symmetric_eigen.hpp"
 
 namespace bms::diagnosis {
 
@@ -159,7 +159,7 @@ Columns law_columns(const LikelihoodModel& likelihood, const HypothesisFit& fit)
 
 /// With the width of the prior that has the most evidence.
 double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
-  const measurement::SymmetricEigen eigen = measurement::symmetric_eigen(gram);
+  const linear_algebra::SymmetricEigen eigen = linear_algebra::symmetric_eigen(gram);
   const Eigen::VectorXd power = eigen.values.cwiseMax(0.0),
                         along = (eigen.vectors.transpose() * toward).array().square();
   double best = 0;

@@ -6,6 +6,7 @@
 
 #include <Eigen/Dense>
 
+#include "linear_algebra/matrix_factors.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::identification {
@@ -91,7 +92,7 @@ Eigen::Matrix3d covariance_of(const FittedDecay& fitted, double variance_v2) {
   const Eigen::Vector3d size = slope.colwise().norm().cwiseMax(1e-300);
   slope *= size.cwiseInverse().asDiagonal();
   const Eigen::Matrix3d normal = slope.transpose() * slope;
-  const Eigen::Matrix3d inverse = normal.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::Matrix3d inverse = linear_algebra::pseudo_inverse(normal);
   return variance_v2 * (size.cwiseInverse().asDiagonal() * inverse * size.cwiseInverse().asDiagonal());
 }
 

@@ -9,8 +9,8 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "identification/matrix_factors.hpp"
 #include "identification/prefilter.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -110,7 +110,7 @@ VectorXd solve(Eigen::MatrixXd a, const VectorXd& y) {
   VectorXd size = a.colwise().norm();
   for (double& s : size) s = s > 0 && std::isfinite(s) ? s : 1;
   a *= size.cwiseInverse().asDiagonal();
-  return size.cwiseInverse().cwiseProduct(solve_least_squares(a, y));
+  return size.cwiseInverse().cwiseProduct(linear_algebra::solve_least_squares(a, y));
 }
 
 /// The output error is linear in all but F: those numbers by linear least squares, and the cost that remains.

@@ -8,8 +8,7 @@
 #include <memory>
 #include <stdexcept>
 
-#include <ceres/jet.h>
-
+#include "arithmetic/dual_number.hpp"
 #include "identification/discretiser.hpp"
 #include "identification/grey_box_limits.hpp"
 #include "identification/ocv_curve.hpp"
@@ -19,8 +18,8 @@ namespace bms::identification {
 
 namespace {
 
-enum Lane { by_soc, by_v_rc, by_r0, by_r1, by_c1, lanes = 6 };  // an even number for SIMD with two lanes
-using Local = ceres::Jet<double, lanes>;
+enum Lane : std::size_t { by_soc, by_v_rc, by_r0, by_r1, by_c1, lanes };
+using Local = arithmetic::DualNumber<arithmetic::whole_registers(lanes)>;
 using Tables = model::Cell<double, model::max_intervals>;
 
 double value_of(double v) { return v; }
@@ -28,7 +27,7 @@ double value_of(const Local& v) { return v.a; }
 
 /// An independent variable of the step: its derivative in its own lane is 1.
 template <class S>
-S local(double value, int own_lane) {
+S local(double value, Lane own_lane) {
   if constexpr (std::same_as<S, double>)
     return value;
   else
@@ -36,10 +35,10 @@ S local(double value, int own_lane) {
 }
 
 /// A value of a table with its slope by SOC, and a lane of its own if it is an unknown.
-Local tabled(double value, double delta, double per_width, int own_lane = -1) {
+Local tabled(double value, double delta, double per_width, Lane own_lane = lanes) {
   Local v(value);
-  v.v[by_soc] = delta * per_width;
-  if (own_lane >= 0) v.v[own_lane] = 1;
+  v.v.set(by_soc, delta * per_width);
+  if (own_lane != lanes) v.v.set(own_lane, 1);
   return v;
 }
 

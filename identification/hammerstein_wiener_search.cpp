@@ -7,6 +7,7 @@
 #include <Eigen/Dense>
 
 #include "identification/variable_projection.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -55,7 +56,7 @@ DiscreteModel integrator_with(double time_constant, const DiscreteModel& like, c
   if (!simulation_error(data, s, x).evaluate(x, r, &jacobian)) return like;
   const auto numerator = static_cast<Index>(s.nb), after = static_cast<Index>(s.nb + s.nf);
   jacobian.middleCols(numerator, after - numerator).setZero();
-  x -= jacobian.completeOrthogonalDecomposition().solve(r);
+  x -= linear_algebra::shortest_least_squares(jacobian, r);
   return to_model(x, s);
 }
 

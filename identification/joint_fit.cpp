@@ -5,8 +5,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include <ceres/jet.h>
-
+#include "arithmetic/dual_number.hpp"
 #include "identification/uncertainty.hpp"
 #include "measurement/in_parallel.hpp"
 #include "model/corrected_readings.hpp"
@@ -19,8 +18,8 @@ using Eigen::VectorXd;
 
 namespace {
 
-constexpr int lanes = 16;  ///< derivatives of one pass
-using Jet = ceres::Jet<double, lanes>;
+constexpr std::size_t lanes = 16;  ///< derivatives of one pass
+using Jet = arithmetic::DualNumber<lanes>;
 using Tables = model::Cell<double, model::max_intervals>;
 
 constexpr double robust_v = 0.03, sigma_v = 0.003, prior_weight = 0.1;
@@ -212,7 +211,7 @@ class JointProblem {
     const auto lane = [&](double v, double slope, std::size_t unknown) {
       S s(v);
       if constexpr (model::Dual<S>) {
-        if (unknown >= from && unknown < from + lanes) s.v[static_cast<Index>(unknown - from)] = slope;
+        if (unknown >= from && unknown < from + lanes) s.v.set(unknown - from, slope);
       }
       return s;
     };
@@ -251,7 +250,7 @@ class JointProblem {
         const std::size_t u = from + j;
         const Index column =
             u < cell_unknowns() ? static_cast<Index>(u) : own(r) + static_cast<Index>(u - cell_unknowns());
-        jacobian(row, column) = slope * v.v[static_cast<Index>(j)];
+        jacobian(row, column) = slope * v.v[j];
       }
     });
   }

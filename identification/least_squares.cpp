@@ -8,8 +8,8 @@
 
 #include <Eigen/QR>
 
-#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -171,7 +171,7 @@ Optimisation::Outlook Optimisation::outlook(const Indices& free) const {
   a = a * norms.cwiseInverse().asDiagonal();
   VectorXd step = VectorXd::Zero(size());
   if (!free.empty()) {
-    const VectorXd p = solve_least_squares(a, -rotated_, dependent_columns);
+    const VectorXd p = linear_algebra::solve_least_squares(a, -rotated_, dependent_columns);
     step(free) = p.cwiseQuotient(norms);
   }
   const double decrease = -expected_change(step);

@@ -10,6 +10,7 @@
 #include "identification/hammerstein_wiener_search.hpp"
 #include "identification/prefilter.hpp"
 #include "identification/resample.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -205,7 +206,7 @@ FitStatistics validate(const LinearModel& model, const Data& given, double fadin
       normal += row * row.transpose();
       right += row * (measured_v - m.output.through(now[k]));
     }
-    initial += normal.completeOrthogonalDecomposition().solve(right);
+    initial += linear_algebra::shortest_least_squares(normal, right);
   }
   m.linear.initial_v.assign(initial.data(), initial.data() + nf);
   return fit_of(data.voltage_v, simulate(m, data.current_a), data.current_a, fading);

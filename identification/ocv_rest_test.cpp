@@ -7,6 +7,8 @@
 
 #include <Eigen/Dense>
 
+#include "linear_algebra/matrix_factors.hpp"
+
 namespace bms::identification {
 
 namespace {
@@ -111,7 +113,7 @@ std::vector<double> polynomial(const OcvPoints& points, std::size_t order) {
     }
   }
   const Eigen::Map<const Eigen::VectorXd> v(points.voltage_v.data(), n);
-  const Eigen::VectorXd x = powers.colPivHouseholderQr().solve(v);
+  const Eigen::VectorXd x = linear_algebra::solve_least_squares(powers, v);
   return {x.begin(), x.end()};
 }
 

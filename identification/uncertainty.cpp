@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "identification/residuals.hpp"
-#include "measurement/symmetric_eigen.hpp"
+#include "linear_algebra/symmetric_eigen.hpp"
 
 namespace bms::identification {
 
@@ -54,7 +54,7 @@ FreeColumns free_columns(const Eigen::MatrixXd& jacobian, const Eigen::VectorXi&
 Eigen::MatrixXd pseudo_inverse(const FreeColumns& free, Eigen::VectorXi& identifiable) {
   constexpr double undetermined = 1e-12;  // eigenvalue
   constexpr double largest_part = 0.01;   // of a parameter that lies in undetermined directions
-  const auto [values, vectors] = measurement::symmetric_eigen(free.scaled.transpose() * free.scaled);
+  const auto [values, vectors] = linear_algebra::symmetric_eigen(free.scaled.transpose() * free.scaled);
   Eigen::VectorXd inverse = values;
   for (double& value : inverse) value = value > undetermined ? 1 / value : 0;
   for (Eigen::Index k = 0; k < free.size(); ++k) {

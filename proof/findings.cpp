@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "measurement/symmetric_eigen.hpp"
+#include "linear_algebra/symmetric_eigen.hpp"
 
 namespace bms::proof {
 
@@ -83,7 +83,7 @@ std::vector<diagnosis::Hypothesis> one_sigma_away(const diagnosis::Diagnosis& d,
     if (catalogue[d.extended.settings[sought[j].setting].index].id == mechanism)
       rows.push_back(static_cast<Eigen::Index>(j));
   }
-  const measurement::SymmetricEigen axes = measurement::symmetric_eigen(d.covariance(rows, rows));
+  const linear_algebra::SymmetricEigen axes = linear_algebra::symmetric_eigen(d.covariance(rows, rows));
   std::vector<diagnosis::Hypothesis> list;
   for (Eigen::Index axis = 0; axis < axes.values.size(); ++axis) {
     const double sigma = std::sqrt(std::max(axes.values[axis], 0.0));

@@ -9,6 +9,7 @@
 #include <Eigen/Dense>
 
 #include "experiments/experiment.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 #include "measurement/in_parallel.hpp"
 #include "study/observations.hpp"
 #include "study/table_cells.hpp"
@@ -32,7 +33,7 @@ std::array<double, wanted> deviations(const std::vector<double>& current_a) {
   const Eigen::MatrixXd by = local_response({}, current_a).by;
   const Eigen::VectorXd size = by.colwise().norm().cwiseMax(1e-12);
   const Eigen::MatrixXd scaled = by * size.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd covariance = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd covariance = linear_algebra::pseudo_inverse(scaled.transpose() * scaled);
   std::array<double, wanted> out{};
   for (std::size_t k = 0; k < wanted; ++k) {
     const auto at = static_cast<Index>(k);

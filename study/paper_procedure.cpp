@@ -6,6 +6,7 @@
 #include <Eigen/Dense>
 
 #include "identification/goodness_of_fit.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::study {
 
@@ -86,7 +87,7 @@ void FromData::set_deviation() {
   if (!grey_box.problem().evaluate(found_.optimum.x, residuals, &jacobian)) return;
   const Eigen::VectorXd norm = jacobian.colwise().norm().cwiseMax(1e-300);
   const Eigen::MatrixXd scaled = jacobian * norm.cwiseInverse().asDiagonal();
-  const Eigen::MatrixXd inverse = (scaled.transpose() * scaled).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = linear_algebra::pseudo_inverse(scaled.transpose() * scaled);
   const double step_s = part_.data.time_s[1] - part_.data.time_s[0];
   for (Eigen::Index k = 0; k < 3; ++k)
     unit_deviation_[static_cast<std::size_t>(k)] = std::sqrt(std::max(0.0, inverse(k, k)) / step_s) / norm[k];

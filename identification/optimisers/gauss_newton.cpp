@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <limits>
 
-#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -17,7 +17,7 @@ using Eigen::VectorXd;
 constexpr int most_bisections = 25;  // MaxBisections of the toolbox
 
 VectorXd subspace_step(const MatrixXd& a, const VectorXd& b, double tolerance) {
-  const auto [u, values, v] = thin_svd(a);
+  const auto [u, values, v] = linear_algebra::thin_svd(a);
   const VectorXd along = u.transpose() * b;
   VectorXd p = VectorXd::Zero(a.cols());
   for (Index k = 0; k < values.size() && values[k] > tolerance * values[0]; ++k) p -= v.col(k) * (along[k] / values[k]);

@@ -11,8 +11,8 @@
 #include <cmath>
 #include <limits>
 
-#include "identification/matrix_factors.hpp"
 #include "identification/optimisers/optimisation.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 namespace bms::identification {
 
@@ -43,7 +43,7 @@ class ScaledModel {
     MatrixXd both = MatrixXd::Zero(2 * n, n);
     both.topRows(n) = run.factor() * scaling_.asDiagonal();
     both.bottomRows(n).diagonal() = curvature_.cwiseSqrt();
-    const ThinSvd svd = thin_svd(both);
+    const linear_algebra::ThinSvd svd = linear_algebra::thin_svd(both);
     values_ = svd.values;
     vectors_ = svd.v;
     along_ = svd.u.topRows(n).transpose() * run.rotated();

@@ -1,9 +1,9 @@
-#include "identification/matrix_factors.hpp"
+#include "linear_algebra/matrix_factors.hpp"
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
 
-namespace bms::identification {
+namespace bms::linear_algebra {
 
 ThinSvd thin_svd(const Eigen::MatrixXd& a) {
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(a, Eigen::ComputeThinU | Eigen::ComputeThinV);
@@ -17,4 +17,10 @@ Eigen::VectorXd solve_least_squares(const Eigen::MatrixXd& a, const Eigen::Vecto
   return qr.solve(b);
 }
 
-}  // namespace bms::identification
+Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b) {
+  return a.completeOrthogonalDecomposition().solve(b);
+}
+
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& a) { return a.completeOrthogonalDecomposition().pseudoInverse(); }
+
+}  // namespace bms::linear_algebra

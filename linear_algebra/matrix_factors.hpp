@@ -1,9 +1,9 @@
-// Factors of dense matrices. Each takes 5 to 8 s to compile inside Eigen, so they are compiled once, here.
+// Factors of dense matrices. Each takes 5 to 15 s to compile inside Eigen, so they are compiled once, here.
 #pragma once
 
 #include <Eigen/Core>
 
-namespace bms::identification {
+namespace bms::linear_algebra {
 
 /// A = U diag(values) V', as many columns as A has rows or columns, whichever is less; values in descending order.
 struct ThinSvd {
@@ -17,4 +17,10 @@ ThinSvd thin_svd(const Eigen::MatrixXd& a);
 /// largest are left out; 0: below rounding.
 Eigen::VectorXd solve_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b, double dependent = 0);
 
-}  // namespace bms::identification
+/// Of all x that minimise |A x - b| the shortest: where columns of A depend on each other, all of them take a share.
+Eigen::VectorXd shortest_least_squares(const Eigen::MatrixXd& a, const Eigen::VectorXd& b);
+
+/// Moore-Penrose inverse.
+Eigen::MatrixXd pseudo_inverse(const Eigen::MatrixXd& a);
+
+}  // namespace bms::linear_algebra

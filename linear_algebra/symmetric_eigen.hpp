@@ -3,7 +3,7 @@
 
 #include <Eigen/Core>
 
-namespace bms::measurement {
+namespace bms::linear_algebra {
 
 /// A = vectors diag(values) vectors', values in ascending order.
 struct SymmetricEigen {
@@ -12,4 +12,4 @@ struct SymmetricEigen {
 };
 SymmetricEigen symmetric_eigen(const Eigen::MatrixXd& a);
 
-}  // namespace bms::measurement
+}  // namespace bms::linear_algebra
