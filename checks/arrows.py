@@ -1,12 +1,13 @@
 #!/usr/bin/python3
 """Checks that each room (folder) includes only what rooms.toml allows.
 
-A room is a table of rooms.toml: a top-level folder, or a folder inside one ("hal/stm32f4") with a list of its own.
-A file belongs to the room with the longest name that matches its path. Read is every #include of every C++ file.
+A room is a table of rooms.toml: a folder with a list of its own. One without a purpose ("hal/stm32f4") is a part of the
+room around it. A file belongs to the room with the longest name that matches its path. Read is every #include of every
+C++ file, with the include roots of rooms.toml.
 It fails when
   * a room includes a room that its `sees` does not list, or an included file belongs to no room;
   * a folder with C++ files is missing in rooms.toml, or a room of rooms.toml is missing in the tree;
-  * the allowed arrows have a circle, between rooms or between top-level folders;
+  * the allowed arrows have a circle, between rooms or between rooms with their parts;
   * a room of the controller sees a room that is not on the controller (`controller = true`);
   * a room reaches a room of its `never` list, also through headers of other rooms;
   * an allowed arrow is not used by any include.
@@ -33,14 +34,22 @@ def room_of(path, rooms):
     return None
 
 
-def top(room):
-    return room.split("/")[0]
+def whole(room, rooms):
+    """The room that `room` is a part of, or itself: the next one up with a purpose."""
+    around = room
+    while "purpose" not in rooms.get(around, {}):
+        around = os.path.dirname(around)
+        if not around:
+            raise ValueError(f"room {room} has no purpose, and no room around it has one")
+    return around
 
 
-def includes(root, rooms, generated, broken):
+def includes(root, rooms, roots, generated, broken):
     """{path: [(place, included path, its room)]}. Appends a message to `broken` for what belongs to no room."""
     found = {}
-    folders = {name for name in os.listdir(root) if os.path.isdir(os.path.join(root, name))}
+    tops = [top for top in ("", *roots) if os.path.isdir(os.path.join(root, top))]
+    folders = {name for top in tops for name in os.listdir(os.path.join(root, top))
+               if os.path.isdir(os.path.join(root, top, name))}
     for path in sources.paths(root, sources.CPP):
         text = sources.read(root, path)
         if room_of(path, rooms) is None:
@@ -52,6 +61,8 @@ def includes(root, rooms, generated, broken):
             if mark == "<" and (target.split("/")[0] not in folders or "/" not in target):
                 continue  # a library outside the project
             place = f"{path}:{sources.line_of(text, include.start(1))}"
+            target = next((path for path in (os.path.join(top, target) for top in tops)
+                           if os.path.isfile(os.path.join(root, path))), target)
             room = generated.get(target) or room_of(target, rooms)
             if room is None:
                 broken.append(f'{place}: "{target}" belongs to no room of rooms.toml')
@@ -78,9 +89,9 @@ def circle(arrows):
         return error.args[1][::-1]
 
 
-def check(root, rooms, generated):
+def check(root, rooms, roots, generated):
     broken, known, used = [], {}, set()
-    found = includes(root, rooms, generated, broken)
+    found = includes(root, rooms, roots, generated, broken)
     for path, rows in found.items():
         room = room_of(path, rooms)
         for place, target, seen in rows:
@@ -101,20 +112,27 @@ def check(root, rooms, generated):
     if names := circle({room: data["sees"] for room, data in rooms.items()}):
         broken.append("rooms.toml: a circle: " + " -> ".join(names))
     elif names := circle(floors_of(rooms)):
-        broken.append("rooms.toml: a circle of top-level folders: " + " -> ".join(names))
+        broken.append("rooms.toml: a circle of rooms with their parts: " + " -> ".join(names))
     return broken, sorted(arrow for arrow in used if arrow[0] != arrow[1])
 
 
 def floors_of(rooms):
-    """{top-level room: set of top-level rooms that it sees}"""
+    """{room: set of rooms that it or a part of it sees}"""
     arrows = {}
     for room, data in rooms.items():
-        arrows.setdefault(top(room), set()).update(top(seen) for seen in data["sees"] if top(seen) != top(room))
+        name = whole(room, rooms)
+        seen = {whole(seen, rooms) for seen in data["sees"]}
+        arrows.setdefault(name, set()).update(seen - {name})
     return arrows
 
 
-def drawing(rooms):
-    """The top-level rooms by floor. Each room sees only rooms of lower floors."""
+def shown(room, roots):
+    """The name by which a room is included."""
+    return next((room[len(top) + 1:] for top in roots if room.startswith(top + "/")), room)
+
+
+def drawing(rooms, roots):
+    """The rooms by floor. Each room sees only rooms of lower floors."""
     arrows, floor = floors_of(rooms), {}
     for room in graphlib.TopologicalSorter(arrows).static_order():
         floor[room] = 1 + max((floor[seen] for seen in arrows[room]), default=-1)
@@ -123,7 +141,8 @@ def drawing(rooms):
     rows = [("floor", "on the controller", "only on the host")]
     for number in range(max(floor[room] for room in drawn), -1, -1):
         here = [room for room in drawn if floor[room] == number]
-        sides = ["  ".join(r for r in here if rooms[r].get("controller", False) is side) for side in (True, False)]
+        sides = ["  ".join(shown(r, roots) for r in here if rooms[r].get("controller", False) is side)
+                 for side in (True, False)]
         rows.append((str(number), *sides))
     width = 2 + max(len(row[1]) for row in rows)
     return "\n".join(f"{row[0]:>5}  {row[1]:<{width}}{row[2]}".rstrip() for row in rows)
@@ -138,19 +157,18 @@ def main():
     try:
         with open(given.rooms or os.path.join(given.root, "checks/rooms.toml"), "rb") as file:
             data = tomllib.load(file)
-        rooms, generated = data["room"], data.get("generated", {})
+        rooms, roots, generated = data["room"], data.get("include_roots", []), data.get("generated", {})
         for room, entry in rooms.items():
-            if "/" not in room and not entry.get("purpose"):
-                raise ValueError(f"room {room} has no purpose")
-            if unknown := [name for name in [top(room), *entry.setdefault("sees", [])] if name not in rooms]:
+            if unknown := [name for name in entry.setdefault("sees", []) if name not in rooms]:
                 raise ValueError(f"room {room} names {unknown[0]}, which is not a room")
+            whole(room, rooms)
         if given.draw:
-            print(drawing(rooms))
+            print(drawing(rooms, roots))
             return 0
     except (OSError, KeyError, ValueError) as error:
         print(f"rooms.toml: {error}", file=sys.stderr)
         return 2
-    broken, found = check(given.root, rooms, generated)
+    broken, found = check(given.root, rooms, roots, generated)
     if given.found:
         for room in sorted(rooms):
             print(f'[room."{room}"]\nsees = {sorted(seen for r, seen in found if r == room)}'.replace("'", '"'))

@@ -9,7 +9,7 @@
 writes one file per part, PART.json.gz. `compare` prints one line per item: "same", "same to" the largest difference,
 or "differs" and the first difference.
 
-    replay       estimates of recordings/forklift_shift.csv and of real recordings, in all three scalars
+    replay       estimates of evidence/recordings/forklift_shift.csv and of real recordings, in all three scalars
     simulate     open-loop voltage of each built-in cell and of each mechanism
     headers      C++ constants of each built-in cell: numbers, fields, names and flags in their order
     experiments  each current profile
@@ -78,7 +78,7 @@ EXPERIMENTS = (
 def items_of(o):
     """The items of each part: command lines that run one after the other, in a folder of their own. What they print and
     the files out.* and printed.csv that they leave are compared."""
-    shift, data = (shlex.quote(str(path)) for path in (o.root / "recordings" / "forklift_shift.csv", o.data))
+    shift, data = (shlex.quote(str(path)) for path in (o.root / "evidence/recordings/forklift_shift.csv", o.data))
     udds, dyn20, hwycol, pulse, discharge, charge = (f"{data}/a123_26650/{name}.csv" for name in (
         "udds_P25_A002", "dyn20_P25_A002", "hwycol_P25_A004", "pulse_P25_A002", "ocv_P25_dis", "ocv_P25_chg"))
     drives = [("forklift_shift", shift, "table9")]

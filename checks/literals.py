@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """Refuses bare numbers in the sources of the diagnosis. A number that a verdict depends on stands in thresholds.hpp.
 
-Read are all .cpp files of diagnosis/ and of its folders. A header such as thresholds.hpp is not read: there each number
-has a name, a unit and a reason. Allowed in a .cpp file are
+Read are all .cpp files of inference/diagnosis/ and of its folders. A header such as thresholds.hpp is not read: there
+each number has a name, a unit and a reason. Allowed in a .cpp file are
   * 0, 0.5, 1 and 2, with any sign, suffix or spelling (0.0, 1u, 2.0F, 0x1);
   * a factor between units (UNIT_FACTORS) that multiplies or divides, or that stands before the text of its unit:
     `1e3 * voltage_v`, `s / 60`, `{1e3, "mV"}`. In a comparison or a sum the same number is a threshold and is refused;
@@ -62,7 +62,7 @@ def bare_numbers(text, path="x.cpp"):
 def main():
     options = sources.options("Refuses bare numbers in the sources of the diagnosis.")
     given = options.parse_args()
-    paths = [path for path in sources.paths(given.root, [".cpp"]) if path.startswith("diagnosis/")]
+    paths = [path for path in sources.paths(given.root, [".cpp"]) if path.startswith("inference/diagnosis/")]
     count = 0
     for path in paths:
         text = sources.read(given.root, path)

@@ -17,62 +17,66 @@ import sources
 
 OWN = os.path.dirname(os.path.abspath(__file__))
 PROJECT = os.path.dirname(OWN)
-DIAGNOSE = "diagnosis/diagnose.cpp"
+DIAGNOSE = "inference/diagnosis/diagnose.cpp"
 
 ROOMS = """
+include_roots = ["host_sim", "inference"]
 [room.model]
 purpose = "Physics."
 controller = true
-[room.files]
+[room."host_sim/files"]
 purpose = "Reads files."
 sees = ["model"]
-[room.diagnosis]
+[room."inference/diagnosis"]
 purpose = "Finds causes."
-sees = ["files"]
+sees = ["host_sim/files"]
 never = []
 """
 CLEAN = {
     "checks/rooms.toml": ROOMS,
     "checks/long.toml": "[functions]\n[files]\n",
     "model/cell.hpp": "// A cell.\n#pragma once\n",
-    "files/cell_file.hpp": '// Reads a cell.\n#pragma once\n#include "model/cell.hpp"\n',
-    "diagnosis/thresholds.hpp": "#pragma once\nconstexpr double least_gain = 0.03;\n",
+    "host_sim/files/cell_file.hpp": '// Reads a cell.\n#pragma once\n#include "model/cell.hpp"\n',
+    "inference/diagnosis/thresholds.hpp": "#pragma once\nconstexpr double least_gain = 0.03;\n",
     DIAGNOSE: '#include "files/cell_file.hpp"\n\ndouble half(double x) { return 0.5 * x; }\n',
     "README.md": "The residual is not significant.\n",
 }
 SAFETY_CLEAN = {
-    "protection/faults.hpp": "enum class Fault { hot, cold };  // not: warm\n",
-    "protection/README.md": "<!-- figures: table -->\n"
+    "firmware/protection/faults.hpp": "enum class Fault { hot, cold };  // not: warm\n",
+    "firmware/protection/README.md": "<!-- figures: table -->\n"
     "| bit | fault | raised when | for | released when | for | recovery | reaction | reason |\n"
     "| 0 | hot | x > 60 | 5 s | x < 50 | 60 s | automatic | open | slow |\n"
     "| 1 | cold | x < 0 | 5 s | x > 2 | 60 s | automatic | open | slow |\n<!-- end of figures -->\n",
-    "protection/table.hpp": "int rows(int hot, int cold);  // and warm\n",
+    "firmware/protection/table.hpp": "int rows(int hot, int cold);  // and warm\n",
     "tests/table_test.cpp": "TEST(Table, IsRight) {}\nTEST_F(Row, Opens) {}\n",
     "docs/safety/requirements.toml": '[[requirement]]\nid = "SR-01"\ntext = "It opens."\nhazards = ["H-01"]\n'
-    'faults = ["hot", "cold"]\ncode = ["protection/table.hpp:rows"]\ntests = ["Table.IsRight", "Row.Opens"]\n'
+    'faults = ["hot", "cold"]\ncode = ["firmware/protection/table.hpp:rows"]\ntests = ["Table.IsRight", "Row.Opens"]\n'
     'assumptions = ["A-01"]\n[[requirement]]\nid = "SR-02"\ntext = "It brakes."\nhazards = ["H-01"]\n'
     'assumptions = ["A-01"]\nlimits = ["L-01"]\n',
     "docs/safety/hazards.md": "| H-01 | fire | S2 | F2 | P1 | d | No fire. | open | 60 s |\n",
     "docs/safety/assumptions.md": "| A-01 | fuse | It melts. |\n| L-01 | It is slow. | late |\n",
     "docs/safety/failures.md": "| F-01 | wire | none | *hot*, `Row.Opens` | 5 s | open | - |\n",
     "docs/safety/threats.md": "| AS-01 | opening | severe |\n| AT-1 | a node | frames |\n"
-    "| T-01 | AS-01 | forged | AT-1, none | high | 5 | a code | `protection/table.hpp:rows` | `Row.Opens` | 1 |\n",
+    "| T-01 | AS-01 | forged | AT-1, none | high | 5 | a code | `firmware/protection/table.hpp:rows` | "
+    "`Row.Opens` | 1 |\n",
     "docs/safety/traceability.md": "".join(f"<!-- figures: {name} -->\n<!-- end of figures -->\n"
                                           for name in ("rows", "hazards", "requirements")),
 }
 DATA = "docs/safety/requirements.toml"
 SAFETY_BREACHES = [  # file, what is added or replaced, what the check must say
-    ("protection/faults.hpp", ("cold", "cold, stuck"), f"{DATA}:1: no requirement names the fault stuck"),
-    ("protection/faults.hpp", ("cold", "cold, stuck"), "README.md:1: the generated table has no row for stuck"),
-    ("protection/README.md", ("60 |", "65 |"), "docs/safety/traceability.md:1: the table rows is out of date"),
-    ("protection/table.hpp", ("rows", "lines"), f"{DATA}:2: SR-01: protection/table.hpp:rows: rows is not in the code"),
+    ("firmware/protection/faults.hpp", ("cold", "cold, stuck"), f"{DATA}:1: no requirement names the fault stuck"),
+    ("firmware/protection/faults.hpp", ("cold", "cold, stuck"),
+     "README.md:1: the generated table has no row for stuck"),
+    ("firmware/protection/README.md", ("60 |", "65 |"), "docs/safety/traceability.md:1: the table rows is out of date"),
+    ("firmware/protection/table.hpp", ("rows", "lines"),
+     f"{DATA}:2: SR-01: firmware/protection/table.hpp:rows: rows is not in the code"),
     ("tests/table_test.cpp", ("IsRight", "IsGood"), f"{DATA}:2: SR-01: Table.IsRight: neither a test"),
     ("tests/table_test.cpp", ("Opens", "Closes"), "failures.md:1: F-01 names Row.Opens: neither a test"),
     (DATA, ('"cold"', '"warm"'), f"{DATA}:2: SR-01: names warm, which does not exist among the faults"),
     (DATA, ('"cold"', '"warm"'), "no requirement names the fault cold"),
-    (DATA, ("table.hpp:rows", "table.hpp:warm"), "warm is not in the code of protection/table.hpp"),
+    (DATA, ("table.hpp:rows", "table.hpp:warm"), "warm is not in the code of firmware/protection/table.hpp"),
     (DATA, ("table.hpp:rows", "table.hpp:hot"), "the requirements of the fault cold name only code of other faults"),
-    (DATA, ('code = ["protection/table.hpp:rows"]', "code = []"), f"{DATA}:2: SR-01: has no code"),
+    (DATA, ('code = ["firmware/protection/table.hpp:rows"]', "code = []"), f"{DATA}:2: SR-01: has no code"),
     (DATA, ('tests = ["Table.IsRight", "Row.Opens"]', "tests = []"), f"{DATA}:2: SR-01: has no tests"),
     (DATA, ('hazards = ["H-01"]\nfaults', 'hazards = []\nfaults'), f"{DATA}:2: SR-01: has no hazard"),
     (DATA, ('"A-01"]\nlimits', '"A-02"]\nlimits'), f"{DATA}:10: SR-02: names A-02, which does not exist"),
@@ -84,23 +88,27 @@ SAFETY_BREACHES = [  # file, what is added or replaced, what the check must say
     ("docs/safety/assumptions.md", "| A-02 | fan | It turns. |\n", "assumptions.md:3: no requirement names A-02"),
     ("docs/safety/assumptions.md", "| L-01 | Again. | - |\n", "assumptions.md:3: L-01 is there twice"),
     ("docs/safety/failures.md", ("*hot*", "*warm*"), "failures.md:1: F-01 names the protection row warm"),
-    ("docs/safety/threats.md", ("table.hpp:rows", "table.hpp:warm"), "T-01 names protection/table.hpp:warm"),
+    ("docs/safety/threats.md", ("table.hpp:rows", "table.hpp:warm"), "T-01 names firmware/protection/table.hpp:warm"),
     ("docs/safety/threats.md", ("`Row.Opens`", "`Row.Shuts`"), "threats.md:3: T-01 names Row.Shuts: neither a test"),
     ("docs/safety/threats.md", ("`Row.Opens`", "-"), "threats.md:3: T-01 has no tests"),
     ("docs/safety/threats.md", ("AT-1, none", "AT-2"), "threats.md:3: T-01 names AT-2, which does not exist"),
     ("docs/safety/threats.md", "| AS-02 | closing | major |\n", "threats.md:4: no threat names AS-02"),
 ]
 LONG_FUNCTION = "void steps() {\n" + "  step();\n" * 59 + "}\n"
+FILES = '[room."host_sim/files"]'
+SEES_FILES = 'sees = ["host_sim/files"]'
 BREACHES = [  # check, file, what is added to it, what the check must say
-    ("arrows", "model/cell.hpp", '#include "files/cell_file.hpp"\n', "model/cell.hpp:3: room model includes files"),
-    ("arrows", "model/cell.hpp", '#include <files/cell_file.hpp>\n', "model/cell.hpp:3: room model includes files"),
+    ("arrows", "model/cell.hpp", '#include "files/cell_file.hpp"\n', "cell.hpp:3: room model includes host_sim/files"),
+    ("arrows", "model/cell.hpp", '#include <files/cell_file.hpp>\n', "cell.hpp:3: room model includes host_sim/files"),
     ("arrows", "model/cell.hpp", '#include "cell_file.hpp"\n', 'model/cell.hpp:3: "cell_file.hpp" belongs to no room'),
     ("arrows", "other/new.hpp", "#pragma once\n", "other/new.hpp:1: the folder other is missing in rooms.toml"),
     ("arrows", "checks/rooms.toml", '[room.empty]\npurpose = "Nothing."\n', "room empty is missing in the tree"),
-    ("arrows", "checks/rooms.toml", ('[room.files]', 'sees = ["files"]\n[room.files]'), "a circle: "),
-    ("arrows", "checks/rooms.toml", ('[room.files]', 'sees = ["files"]\n[room.files]'), "must not see files"),
-    ("arrows", "checks/rooms.toml", ('["files"]', '["files", "model"]'), "diagnosis may see model, but no file"),
-    ("arrows", "checks/rooms.toml", ('never = []', 'never = ["model"]'), "diagnosis reaches model through files"),
+    ("arrows", "checks/rooms.toml", (FILES, f"{SEES_FILES}\n{FILES}"), "a circle: "),
+    ("arrows", "checks/rooms.toml", (FILES, f"{SEES_FILES}\n{FILES}"), "must not see host_sim/files"),
+    ("arrows", "checks/rooms.toml", (SEES_FILES, SEES_FILES.replace("]", ', "model"]')),
+     "diagnosis may see model, but no file"),
+    ("arrows", "checks/rooms.toml", ('never = []', 'never = ["model"]'),
+     "diagnosis reaches model through host_sim/files"),
     ("literals", DIAGNOSE, "bool large(double x) { return x > 0.03; }\n", "diagnose.cpp:4: 0.03 is a bare number"),
     ("literals", DIAGNOSE, "bool late(double t) { return t > 60; }\n", "diagnose.cpp:4: 60 is a bare number"),
     ("literals", DIAGNOSE, "double third(double* x) { return x[3]; }\n", "diagnose.cpp:4: 3 is a bare number"),
@@ -116,7 +124,7 @@ BREACHES = [  # check, file, what is added to it, what the check must say
     ("words", DIAGNOSE, 'auto text = "a fault beside it";\n', "diagnose.cpp:4: beside ->"),
     ("words", "README.md", "For who builds a truck.\n", "README.md:2: For who ->"),
     ("format", DIAGNOSE, "int  badly( int x ){return x ;}\n", "diagnose.cpp:4:"),
-    ("format", "reports/page/new.js", "const x = {a:1};\n", "reports/page/new.js:1:"),
+    ("format", "host_sim/reports/page/new.js", "const x = {a:1};\n", "host_sim/reports/page/new.js:1:"),
 ]
 
 
@@ -180,7 +188,7 @@ def faults_of_the_projects_rooms(root):
     for path in paths:
         write(root, path, sources.read(PROJECT, path))
     victim = next(path for path in paths if path.startswith("estimator/"))
-    message = f"{victim}:1: room estimator includes files"
+    message = f"{victim}:1: room estimator includes host_sim/files"
     if message in outcome("arrows", root)[1]:
         yield f"arrows: finds a breach in {victim} before it is there"
     write(root, victim, '#include "files/cell_file.hpp"\n' + sources.read(PROJECT, victim))

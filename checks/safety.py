@@ -3,8 +3,8 @@
 
 requirements.toml connects each row of the protection table with hazards, code and tests. Refused are:
 
-  a fault of protection/faults.hpp without a requirement, without code that is not only another fault's, or
-  without a row in protection/README.md
+  a fault of firmware/protection/faults.hpp without a requirement, without code that is not only another fault's, or
+  without a row in firmware/protection/README.md
   a requirement without a hazard; without code or tests, unless it is allocated to the vehicle by assumptions
   a hazard, fault, assumption, known limit, code symbol or test that is named but does not exist
   a hazard, an assumption or a known limit that no requirement names
@@ -26,7 +26,7 @@ import sources
 FOLDER = "docs/safety"
 DATA, HAZARDS, ASSUMPTIONS, FAILURES, TRACE, THREATS = (f"{FOLDER}/{name}" for name in (
     "requirements.toml", "hazards.md", "assumptions.md", "failures.md", "traceability.md", "threats.md"))
-FAULTS, TABLE = "protection/faults.hpp", "protection/README.md"
+FAULTS, TABLE = "firmware/protection/faults.hpp", "firmware/protection/README.md"
 RISK_GRAPH = {("S1", "F1", "P1"): "a", ("S1", "F1", "P2"): "b", ("S1", "F2", "P1"): "b", ("S1", "F2", "P2"): "c",
               ("S2", "F1", "P1"): "c", ("S2", "F1", "P2"): "d", ("S2", "F2", "P1"): "d", ("S2", "F2", "P2"): "e"}
 KEYS = ("id", "text", "hazards", "faults", "code", "tests", "assumptions", "limits")

@@ -25,7 +25,8 @@ def paths(root, endings):
     build, or generated."""
     found = []
     for folder, folders, names in os.walk(root):
-        folders[:] = sorted(f for f in folders if not f.startswith(".") and f not in ("build", "generated", "__pycache__")
+        folders[:] = sorted(f for f in folders if not f.startswith(".")
+                            and f not in ("build", "generated", "__pycache__")
                             and not os.path.exists(os.path.join(folder, f, "CMakeCache.txt")))
         found += [os.path.relpath(os.path.join(folder, n), root) for n in names if n.endswith(tuple(endings))]
     return sorted(found)

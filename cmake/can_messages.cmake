@@ -1,8 +1,8 @@
 # The packing code of the CAN messages, generated from the DBC files by ./bms messages and committed, so that a build
 # needs no canmatrix:
 #
-#   can/greybox_bms.dbc      can/generated/can_messages.hpp
-#   can/j1939_profile.dbc    can/generated/j1939_messages.hpp
+#   firmware/can/greybox_bms.dbc      firmware/can/generated/can_messages.hpp
+#   firmware/can/j1939_profile.dbc    firmware/can/generated/j1939_messages.hpp
 #
 # Link bms_can to include them.
 find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
@@ -20,9 +20,9 @@ function(bms_check_messages header dbc)
   endif()
 endfunction()
 
-set(can_messages ${PROJECT_SOURCE_DIR}/can/generated/can_messages.hpp)
-set(j1939_messages ${PROJECT_SOURCE_DIR}/can/generated/j1939_messages.hpp)
-bms_check_messages(${can_messages} ${PROJECT_SOURCE_DIR}/can/greybox_bms.dbc)
-bms_check_messages(${j1939_messages} ${PROJECT_SOURCE_DIR}/can/j1939_profile.dbc)
+set(can_messages ${PROJECT_SOURCE_DIR}/firmware/can/generated/can_messages.hpp)
+set(j1939_messages ${PROJECT_SOURCE_DIR}/firmware/can/generated/j1939_messages.hpp)
+bms_check_messages(${can_messages} ${PROJECT_SOURCE_DIR}/firmware/can/greybox_bms.dbc)
+bms_check_messages(${j1939_messages} ${PROJECT_SOURCE_DIR}/firmware/can/j1939_profile.dbc)
 add_library(bms_can INTERFACE)
-target_include_directories(bms_can INTERFACE ${PROJECT_SOURCE_DIR} ${PROJECT_SOURCE_DIR}/can/generated)
+target_include_directories(bms_can INTERFACE ${BMS_INCLUDE_ROOTS} ${PROJECT_SOURCE_DIR}/firmware/can/generated)

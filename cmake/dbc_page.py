@@ -1,4 +1,4 @@
-"""Writes the page can/messages.md from its template, the DBC files and the firmware's own frames (the JSON of
+"""Writes the page firmware/can/messages.md from its template, the DBC files and the firmware's own frames (the JSON of
 tests/firmware/vehicle_start.cpp on standard input). Needs python3-canmatrix.
 
     vehicle_start | dbc_page.py [--compare] IN.dbc J1939.dbc PAGE.md       template: PAGE.in.md

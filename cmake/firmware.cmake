@@ -22,8 +22,8 @@
 #   BMS_PRECHARGE_S, BMS_CLOSING_A, BMS_CLOSING_OHM  of the truck, see boards/README.md; also as -DBMS_PRECHARGE_S=S
 #   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
 #
-# BMS_VEHICLE_PROFILE adds messages for other makers' devices (can/messages.md): cia418 for a CANopen charger, with the
-# nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
+# BMS_VEHICLE_PROFILE adds messages for other makers' devices (firmware/can/messages.md): cia418 for a CANopen charger,
+# with the nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
 #
 # BMS_PRODUCTION=ON builds images for a product: without a device key, or with the one for development, no contactor
 # closes and no service session opens (docs/safety/commands.md).
@@ -59,7 +59,7 @@ if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
 endif()
 
-set(BMS_VEHICLE_PROFILE none CACHE STRING "additional messages: none, cia418 or j1939 (can/messages.md)")
+set(BMS_VEHICLE_PROFILE none CACHE STRING "additional messages: none, cia418 or j1939 (firmware/can/messages.md)")
 set(BMS_CANOPEN_NODE 1 CACHE STRING "CANopen node of the battery")
 set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
 if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
@@ -227,7 +227,7 @@ bms_shared_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_ha
   ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
 bms_shared_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp
   ${no_hardware})
-bms_shared_objects(storage -Os ${root}/storage/log.cpp ${root}/storage/persistence.cpp)
+bms_shared_objects(storage -Os ${root}/firmware/storage/log.cpp ${root}/firmware/storage/persistence.cpp)
 if(NOT BMS_SHARED_OBJECTS)
   target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
   target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})

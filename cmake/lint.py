@@ -3,8 +3,8 @@
     lint.py HOST_BUILD [all]     HOST_BUILD: a configured build of the host with a built cell_header
 
 Code of the controller is checked as the cross compiler sees it: all sources of the first board, and of each further
-board (folder in boards/) those that no board before it had. Of the host, only monitor/ and hil/ are checked, without
-the analyzer, because sanitizers run there. With `all`, everything is checked, tests included.
+board (folder in boards/) those that no board before it had. Of the host, only host_sim/monitor/ and host_sim/hil/ are
+checked, without the analyzer, because sanitizers run there. With `all`, everything is checked, tests included.
 """
 import json
 import os
@@ -96,7 +96,8 @@ def of_the_boards(host_build):
 
 def of_the_host(build, everything, seen):
     """Work for tidy(): the sources of the host that were not seen."""
-    folders = [ROOT + os.sep] if everything else [os.path.join(ROOT, f) + os.sep for f in ("monitor", "hil")]
+    folders = [ROOT + os.sep] if everything else [os.path.join(ROOT, "host_sim", f) + os.sep
+                                                    for f in ("monitor", "hil")]
     generated = os.path.join(ROOT, "build")
     return [(f, build, ["--checks=-clang-analyzer-*"]) for f in sources(build)
             if f.startswith(tuple(folders)) and f not in seen and not f.startswith(generated)]

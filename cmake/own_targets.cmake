@@ -3,7 +3,13 @@
 #   bms_warnings      interface library with the warning options. Warnings are errors only with
 #                     -DCMAKE_COMPILE_WARNING_AS_ERROR=ON (./bms lint): another compiler warns of other things, and must
 #                     not keep anybody from building
-#   bms_own_targets   links it, and adds the include path, to every library and program below a folder
+#   bms_own_targets   links it, and adds the include paths, to every library and program below a folder
+#   BMS_INCLUDE_ROOTS folders whose rooms are included by their name alone: "protection/table.hpp"
+
+set(BMS_INCLUDE_ROOTS ${PROJECT_SOURCE_DIR})
+foreach(group firmware host_sim inference evidence)
+  list(APPEND BMS_INCLUDE_ROOTS ${PROJECT_SOURCE_DIR}/${group})
+endforeach()
 
 add_library(bms_warnings INTERFACE)
 target_compile_options(bms_warnings INTERFACE -Wall -Wextra -Wshadow -Wconversion)
@@ -15,7 +21,7 @@ function(bms_own_targets folder)
     get_target_property(type ${target} TYPE)
     if(type MATCHES "^(STATIC_LIBRARY|MODULE_LIBRARY|OBJECT_LIBRARY|EXECUTABLE)$")
       target_link_libraries(${target} PRIVATE bms_warnings)
-      target_include_directories(${target} PRIVATE ${PROJECT_SOURCE_DIR})
+      target_include_directories(${target} PRIVATE ${BMS_INCLUDE_ROOTS})
     endif()
   endforeach()
   get_property(subfolders DIRECTORY ${folder} PROPERTY SUBDIRECTORIES)

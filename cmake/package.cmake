@@ -1,4 +1,5 @@
-# Installation and the Debian package. The tool finds what is installed relative to itself (images/firmware_image.cpp).
+# Installation and the Debian package. The tool finds what is installed relative to itself
+# (host_sim/images/firmware_image.cpp).
 include(GNUInstallDirs)
 set(data ${CMAKE_INSTALL_DATADIR}/greybox)
 
@@ -22,13 +23,13 @@ install(FILES ${completions}/bms.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/
 
 # data: cell files, CAN messages, the recording of the first example
 install(DIRECTORY model/cells DESTINATION ${data} COMPONENT tool FILES_MATCHING PATTERN *.toml PATTERN README.md)
-install(FILES can/greybox_bms.dbc can/j1939_profile.dbc DESTINATION ${data}/can COMPONENT tool)
-install(FILES recordings/forklift_shift.csv DESTINATION ${data}/recordings COMPONENT tool)
+install(FILES firmware/can/greybox_bms.dbc firmware/can/j1939_profile.dbc DESTINATION ${data}/can COMPONENT tool)
+install(FILES evidence/recordings/forklift_shift.csv DESTINATION ${data}/recordings COMPONENT tool)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT tool)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT tool)
 # sources from which the tool builds the firmware of a board with a cell
-install(DIRECTORY arithmetic authentication boards can cmake estimator firmware hal library measurement model protection
-  storage DESTINATION ${data}/source COMPONENT tool PATTERN __pycache__ EXCLUDE)
+install(DIRECTORY arithmetic boards cmake estimator firmware hal library measurement model
+  DESTINATION ${data}/source COMPONENT tool PATTERN __pycache__ EXCLUDE)
 install(FILES CMakeLists.txt LICENSE DESTINATION ${data}/source COMPONENT tool)
 foreach(image fault filter_forms pack protection)
   install(FILES tests/firmware/${image}_image.cpp DESTINATION ${data}/source/tests/firmware COMPONENT tool)

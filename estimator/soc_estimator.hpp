@@ -113,7 +113,7 @@ class SocEstimator {
   constexpr std::uint64_t time_us() const { return time_us_; }
 
  private:
-  friend struct LaneAccess;  ///< steps many estimators at once (host_sim/lane_access.hpp)
+  friend struct LaneAccess;  ///< steps many estimators at once (host_sim/replay/lane_access.hpp)
 
   using StepInput = model::StepInput<S>;
   using At = model::TablePoint<S>;

@@ -20,9 +20,9 @@
 //
 // The charger's heartbeat (700h + charger) starts and ends the charge, see request().
 //
-// can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end protection: use
-// the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s. An SDO request
-// is answered with the next sample.
+// firmware/can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end
+// protection: use the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s.
+// An SDO request is answered with the next sample.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Handles the commands that a vehicle or a workshop sends over CAN (Command in can/greybox_bms.dbc) and makes the
-// answer to each.
+// Handles the commands that a vehicle or a workshop sends over CAN (Command in firmware/can/greybox_bms.dbc) and makes
+// the answer to each.
 //
 // A frame with a wrong CRC, another identifier or the counter of the previous command is ignored. An invalid argument
 // is answered "refused", an unknown code "no such command", one without the authority that it needs "not authorised";

@@ -1,6 +1,6 @@
 // Requests for power that a node without the pack's drive key can neither forge nor repeat: DriveRequest carries a
-// freshness number and a code over it (authentication/codes.hpp). The challenge in that code is new at each start and
-// when the numbers are used up, so a recorded request is never accepted again.
+// freshness number and a code over it (firmware/authentication/codes.hpp). The challenge in that code is new at each
+// start and when the numbers are used up, so a recorded request is never accepted again.
 //
 // A wrong code costs the sender nothing, because a lock would let anybody stop the truck. hal/request_queue.hpp passes
 // at most 48 requests on with each sample. At 480 guesses a second, one is right in 100 days on average, and drives for

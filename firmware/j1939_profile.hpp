@@ -1,6 +1,6 @@
 // Sends DC_SOURCE_STATUS_1, 2, 3, 4, 6 and 11 of RV-C in addition to the battery's own messages, for chargers and
-// displays of other makers. RV-C is a J1939 protocol with open layouts (can/j1939_profile.dbc; sources:
-// can/messages.md). Build option: BMS_VEHICLE_PROFILE=j1939.
+// displays of other makers. RV-C is a J1939 protocol with open layouts (firmware/can/j1939_profile.dbc; sources:
+// firmware/can/messages.md). Build option: BMS_VEHICLE_PROFILE=j1939.
 //
 // Each message has its own cycle, in the time of the samples, and is sent while a node listens. Nothing is received: no
 // address is claimed and no request is answered. There is no end-to-end protection: use the battery's own messages for

@@ -1,6 +1,6 @@
 // Latched faults over a loss of power: those that only service clears. They are stored twice, in a setting
-// (storage/persistence.hpp) and in backup registers (hal/calendar.hpp), and a fault that either has is latched at the
-// next start. So neither worn-out flash nor an empty backup battery loses a latch.
+// (firmware/storage/persistence.hpp) and in backup registers (hal/calendar.hpp), and a fault that either has is latched
+// at the next start. So neither worn-out flash nor an empty backup battery loses a latch.
 //
 // The backup registers count only if their supply is proven: at a start after the power was off, their content was
 // intact. The proof itself is stored with them.

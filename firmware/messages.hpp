@@ -1,4 +1,4 @@
-// Converts estimates, decisions and states into the messages of can/greybox_bms.dbc.
+// Converts estimates, decisions and states into the messages of firmware/can/greybox_bms.dbc.
 #pragma once
 
 #include <algorithm>

@@ -1,5 +1,5 @@
 // A service session: a node that clears faults, calibrates or sets the time first proves that it has this pack's
-// service key, then proves it again with every command (authentication/codes.hpp).
+// service key, then proves it again with every command (firmware/authentication/codes.hpp).
 //
 //   closed --challenge wanted--> challenge --right response--> open --close, or 60 s without a command--> closed
 //                                          --third wrong one--> locked for ten minutes, then one attempt each

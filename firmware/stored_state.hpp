@@ -1,5 +1,5 @@
-// Converts estimate and condition into the integers that are stored (storage/persistence.hpp), and stored integers back
-// into starting values.
+// Converts estimate and condition into the integers that are stored (firmware/storage/persistence.hpp), and stored
+// integers back into starting values.
 #pragma once
 
 #include <algorithm>

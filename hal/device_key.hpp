@@ -1,6 +1,6 @@
-// The secret of this unit, from which the keys of its trucks and workshops follow (authentication/codes.hpp). The
-// production line writes it once. Back ends: stm32f4/device_key (one-time programmable memory), absent/ (a chip without
-// a place for it, or an emulator).
+// The secret of this unit, from which the keys of its trucks and workshops follow (firmware/authentication/codes.hpp).
+// The production line writes it once. Back ends: stm32f4/device_key (one-time programmable memory), absent/ (a chip
+// without a place for it, or an emulator).
 #pragma once
 
 #include <array>

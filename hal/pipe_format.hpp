@@ -1,4 +1,4 @@
-// Record format between emulated/can_pipe.cpp on the board and hil/emulated_link.cpp on the host:
+// Record format between emulated/can_pipe.cpp on the board and host_sim/hil/emulated_link.cpp on the host:
 //
 //   record    u32 id, u8 length, u8 of_block, u8 long_id, u8 0, u8 data[8]        little-endian, 16 bytes
 //   block     up to 128 records; of_block: number of records that follow in this block

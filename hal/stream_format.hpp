@@ -4,7 +4,7 @@
 //   out   32-bit words of one estimate after the other
 //
 // The firmware gives the words of an estimate; it adds one for each state of a mechanism. The board passes them on
-// unchanged, and the host (images/emulator.cpp) knows how many there are.
+// unchanged, and the host (host_sim/images/emulator.cpp) knows how many there are.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
-// A recording in memory: current, voltage and temperature over time, one column each. files/recording.hpp reads it from
-// CSV; replay, identification and diagnosis view the same columns (measurement/column.hpp).
+// A recording in memory: current, voltage and temperature over time, one column each. host_sim/files/recording.hpp
+// reads it from CSV; replay, identification and diagnosis view the same columns (measurement/column.hpp).
 //
 // Row k: current_a is the mean current over the interval that ends at time_s (> 0 charges); voltage_v is sampled at
 // time_s. NaN is a missing reading; time_s has none.

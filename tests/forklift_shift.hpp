@@ -1,4 +1,4 @@
-// The shipped recording of a forklift shift, for tests that do without the readers of files/.
+// The shipped recording of a forklift shift, for tests that do without the readers of host_sim/files/.
 #pragma once
 
 #include <fstream>
@@ -13,10 +13,10 @@ struct ShiftRow {
   double time_s = 0, current_a = 0, voltage_v = 0, temperature_c = 0;
 };
 
-/// Rows of recordings/forklift_shift.csv, whose first four columns are those of ShiftRow. source: the folder that
-/// holds recordings/. Throws std::runtime_error if the file has another form.
+/// Rows of evidence/recordings/forklift_shift.csv, whose first four columns are those of ShiftRow. source: the folder
+/// that holds evidence/recordings/. Throws std::runtime_error if the file has another form.
 inline std::vector<ShiftRow> forklift_shift(const std::string& source) {
-  std::ifstream file(source + "/recordings/forklift_shift.csv");
+  std::ifstream file(source + "/evidence/recordings/forklift_shift.csv");
   std::string line;
   while (std::getline(file, line) && line.starts_with('#')) {
   }

@@ -1,10 +1,10 @@
 // Content of the chip's data memory for a board, as a table that is written in CONFIG_UPDATE mode and read back; and
 // what the driver has to know of the board.
 //
-// The chip's own protections are the second line. Their thresholds and delays come from the first line (protection/),
-// so that they are wider and slower; firmware/front_end/ computes and compares them. They act on pins of their own
-// (DDSG and DCHG to the enable inputs of the contactor drivers), and also if this core has not communicated for
-// host_silence_s.
+// The chip's own protections are the second line. Their thresholds and delays come from the first line
+// (firmware/protection/), so that they are wider and slower; firmware/front_end/ computes and compares them. They act
+// on pins of their own (DDSG and DCHG to the enable inputs of the contactor drivers), and also if this core has not
+// communicated for host_silence_s.
 //
 // Addresses and fields: SLUUBY2B, chapter 13. README.md lists those that could not be checked there.
 #pragma once

@@ -2,10 +2,10 @@
 //
 //   du/dt = (R I - u) / tau,  R = R_charge while I > 0, else R_discharge        V += u
 //
-// The term of an unknown cause in the slow polarisation (diagnosis/law_term.hpp), not a cause that is searched. Two
-// resistances of opposite sign follow the size of the load whatever its direction; one alone follows charging or
-// discharging alone. Resistances of both signs are allowed: what is unknown may act against the current. They are the
-// same at all temperatures.
+// The term of an unknown cause in the slow polarisation (inference/diagnosis/law_term.hpp), not a cause that is
+// searched. Two resistances of opposite sign follow the size of the load whatever its direction; one alone follows
+// charging or discharging alone. Resistances of both signs are allowed: what is unknown may act against the current.
+// They are the same at all temperatures.
 #pragma once
 
 #include "arithmetic/exponential.hpp"

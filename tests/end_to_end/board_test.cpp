@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/end_to_end/run_tool.hpp"
-#include "tests/files/rejected_input.hpp"
+#include "tests/host_sim/files/rejected_input.hpp"
 
 namespace bms {
 namespace {

@@ -21,7 +21,7 @@ class CanLogTool : public ::testing::Test {
 
   /// The frames of the emulated board for the beginning of the shift, over a wire that loses frames.
   std::string log_of(const std::string& more = "") const {
-    const std::string shift = content(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+    const std::string shift = content(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv");
     std::size_t end = 0;
     for (int line = 0; line < 400; ++line) end = shift.find('\n', end) + 1;
     files::write_file(path("part.csv"), shift.substr(0, end));

@@ -7,7 +7,9 @@ namespace bms {
 namespace {
 
 const std::filesystem::path data = BMS_DATA_DIR;
-std::vector<FixedPointRun> runs() { return fixed_point_runs(BMS_SOURCE_DIR "/recordings/forklift_shift.csv", data); }
+std::vector<FixedPointRun> runs() {
+  return fixed_point_runs(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv", data);
+}
 constexpr std::size_t shift_and_recordings = 1 + 27 + 11 + 13;
 
 TEST(FixedPoint, IsWithinATenthOfAPercentOfDoubleOverTheShiftAndEveryRealRecording) {

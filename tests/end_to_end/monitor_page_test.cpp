@@ -285,7 +285,7 @@ TEST_F(ServedPage, ShowsValuesAndPlotsInABrowserAndLoadsNothingElse) {
   };
   ASSERT_TRUE(soon("window.points && points.length > 500 && charts.soc.numRows() === points.length"))
       << browser.value_of("document.body.innerText");
-  // the last sample, as tests/monitor/traffic.hpp makes it: 50 + 30 cos(29,999 / 2,700) %
+  // the last sample, as tests/host_sim/monitor/traffic.hpp makes it: 50 + 30 cos(29,999 / 2,700) %
   EXPECT_EQ(browser.value_of("document.getElementById('soc').textContent"), "53.4\u202f%");
   EXPECT_EQ(browser.value_of("document.getElementById('quality').textContent"), "carried by counting");
   EXPECT_NEAR(browser.value_of("points[0][1]").get<double>(), 80, 0.01);

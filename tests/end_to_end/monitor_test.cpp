@@ -17,7 +17,7 @@
 #include "hal/slcan/codec.hpp"
 #include "monitor/candump_line.hpp"
 #include "tests/end_to_end/run_tool.hpp"
-#include "tests/monitor/traffic.hpp"
+#include "tests/host_sim/monitor/traffic.hpp"
 #include "tests/pseudo_terminal.hpp"
 
 namespace bms {

@@ -47,7 +47,9 @@ TEST(ReportPage, DrawsFiveChartsAndTheFiguresWithoutAnError) {
   if (!images::in_path("chromium")) GTEST_SKIP() << "no chromium";
   const files::TemporaryFolder folder;
   const auto page = folder.path() / "report.html";
-  ASSERT_EQ(run_tool("replay " BMS_SOURCE_DIR "/recordings/forklift_shift.csv --report " + page.string()).exit_code, 0);
+  ASSERT_EQ(
+      run_tool("replay " BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv --report " + page.string()).exit_code,
+      0);
   const std::string dom = document_of(page, folder.path());
   EXPECT_EQ(count(dom, "SCRIPT ERROR"), 1U) << "only the listener's own text";
   EXPECT_GE(count(dom, "<canvas"), 10U);  // two per chart
@@ -86,7 +88,7 @@ std::string diagnosis_dom(const std::string& with, const std::string& holdout, c
   const auto simulated = [&](const std::string& name, int seed) {
     const std::string recording = (folder.path() / name).string();
     EXPECT_EQ(run_tool("simulate --cell table9 --recording " BMS_SOURCE_DIR
-                       "/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " +
+                       "/evidence/recordings/forklift_shift.csv --initial-soc 0.98 --noise-v 0.001 " +
                        with + " --seed " + std::to_string(seed) + " --out " + recording)
                   .exit_code,
               0);

@@ -134,8 +134,8 @@ TEST_F(ProofTool, EveryClaimIsInJsonAndPageWhetherItHoldsOrNot) {
 
 /// Every recording that an experiment names is part of the repository.
 TEST(ProofRecordings, AreInTheRepository) {
-  const std::filesystem::path experiments = BMS_SOURCE_DIR "/proof/experiments",
-                              recordings = BMS_SOURCE_DIR "/recordings";
+  const std::filesystem::path experiments = BMS_SOURCE_DIR "/evidence/proof/experiments",
+                              recordings = BMS_SOURCE_DIR "/evidence/recordings";
   std::set<std::string> named;
   for (const auto& entry : std::filesystem::directory_iterator(experiments)) {
     const std::string text = content(entry.path());
@@ -147,10 +147,10 @@ TEST(ProofRecordings, AreInTheRepository) {
 }
 
 /// The second page of ./bms demo: leads and contacts that the cell file does not contain, in a real recording. What a
-/// second voltmeter found stands in recordings/nasa_18650/README.md.
+/// second voltmeter found stands in evidence/recordings/nasa_18650/README.md.
 TEST(RealRecording, ContactsThatTheCellFileDoesNotContainAreNamedMeasuredAndModelled) {
   const files::TemporaryFolder folder;
-  const std::string recordings = BMS_SOURCE_DIR "/recordings/nasa_18650/B0025/",
+  const std::string recordings = BMS_SOURCE_DIR "/evidence/recordings/nasa_18650/B0025/",
                     cell = (folder.path() / "cell.toml").string(), result = (folder.path() / "r.json").string();
   ASSERT_EQ(
       run_tool("identify --quiet --recording " + recordings + "d005.csv.gz " + recordings +

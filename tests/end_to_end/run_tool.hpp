@@ -28,7 +28,7 @@ inline std::string content(const std::filesystem::path& path) {
 }
 
 /// The forklift shift of this repository: eight hours at 1 Hz.
-inline const std::string shift = BMS_SOURCE_DIR "/recordings/forklift_shift.csv";
+inline const std::string shift = BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv";
 /// Real recordings, which are not part of the repository; tests that need them skip if they are missing.
 inline const std::filesystem::path data = BMS_DATA_DIR;
 

@@ -56,7 +56,7 @@ class SemiReal : public ::testing::Test {
  protected:
   SemiReal() {
     for (const char* name : {"d003_load.csv.gz", "d005.csv.gz", "d007.csv.gz"})
-      std::filesystem::copy_file(std::filesystem::path(BMS_SOURCE_DIR "/recordings/nasa_18650/B0025") / name,
+      std::filesystem::copy_file(std::filesystem::path(BMS_SOURCE_DIR "/evidence/recordings/nasa_18650/B0025") / name,
                                  folder_.path() / name);
   }
   void write(const std::string& name, const std::string& text) { files::write_file(folder_.path() / name, text); }
@@ -64,9 +64,10 @@ class SemiReal : public ::testing::Test {
   /// Runs the script. arguments: behind the folder with the programs.
   ToolRun run(const std::string& arguments) const {
     const std::string out = (folder_.path() / "stdout").string(), err = (folder_.path() / "stderr").string();
-    const int status = std::system((BMS_PYTHON " -B " BMS_SOURCE_DIR "/benchmark/semi_real.py " BMS_BENCHMARKS " " +
-                                    arguments + " >" + out + " 2>" + err)
-                                       .c_str());
+    const int status =
+        std::system((BMS_PYTHON " -B " BMS_SOURCE_DIR "/evidence/benchmark/semi_real.py " BMS_BENCHMARKS " " +
+                     arguments + " >" + out + " 2>" + err)
+                        .c_str());
     return {WEXITSTATUS(status), content(out), content(err)};
   }
   std::string data() const { return folder_.path().string(); }

@@ -37,12 +37,11 @@ TEST(SocTrials, SlowRunsAreInsideTwoSigma) {
       if (!entry.path().stem().string().starts_with("ocv_") || entry.path().extension() != ".csv") continue;
       SCOPED_TRACE(entry.path());
       ++runs;
-      host_sim::ReplayResult r;
+      replay::ReplayResult r;
       r.cell = cell;
       r.recording = files::read_recording(entry.path().string());
-      r.track =
-          host_sim::run_on_host(r.cell, measurement::samples(r.recording), host_sim::starting_point({}), r.scalar);
-      host_sim::evaluate(r);
+      r.track = replay::run_on_host(r.cell, measurement::samples(r.recording), replay::starting_point({}), r.scalar);
+      replay::evaluate(r);
       EXPECT_GE(*r.soc.within_2_sigma, 0.9);
       EXPECT_LT(*r.soc.rmse, 0.06);
     }
@@ -56,12 +55,11 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
   std::size_t trials = 0;
   std::vector<double> sigmas, of_cuts;
   each_soc_trial(data, [&](const SocTrial& t) {
-    host_sim::ReplayResult r;
+    replay::ReplayResult r;
     r.cell = t.cell;
     r.recording = t.recording;
-    r.track =
-        host_sim::run_on_host(t.cell, measurement::samples(t.recording), host_sim::starting_point(t.prior), r.scalar);
-    host_sim::evaluate(r);
+    r.track = replay::run_on_host(t.cell, measurement::samples(t.recording), replay::starting_point(t.prior), r.scalar);
+    replay::evaluate(r);
     SCOPED_TRACE(t.name + ", " + t.trouble);
     ++trials;
     const auto rows = static_cast<double>(r.track.rows.size());
@@ -86,7 +84,7 @@ TEST(SocTrials, StartedRightOrWrongWithSensorsOffOrOn) {
         EXPECT_LT(*r.soc.max_error_after_30min, 0.017);
       }
     }
-    for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(e.soc_sigma);
+    for (const replay::EstimateRow& e : r.track.rows) sigmas.push_back(e.soc_sigma);
     if (t.trouble == "initial SOC correct" && t.name.ends_with("_A002") && t.name.starts_with("dyn")) {
       EXPECT_NEAR(*r.soc.current_offset_a, 0.008, 2 * *r.soc.current_offset_sigma_a)
           << "7 to 9 mA are read while nothing flows";
@@ -109,9 +107,9 @@ TEST(SocTrials, AreBitEqualOnTheBoard) {
   each_soc_trial(data, [&](const SocTrial& t) {
     if (trial++ % 7 != 0) return;
     const auto all = measurement::samples(t.recording);
-    const auto start = host_sim::starting_point(t.prior);
-    const auto difference = host_sim::first_difference(host_sim::run_on_host(t.cell, all, start, board.scalar),
-                                                       images::run_on_board(board, t.cell, all, start), board.scalar);
+    const auto start = replay::starting_point(t.prior);
+    const auto difference = replay::first_difference(replay::run_on_host(t.cell, all, start, board.scalar),
+                                                     images::run_on_board(board, t.cell, all, start), board.scalar);
     EXPECT_FALSE(difference) << t.name << ", " << t.trouble << ": " << (difference ? difference->field : "");
   });
 }

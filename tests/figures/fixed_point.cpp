@@ -30,11 +30,11 @@ std::vector<FixedPointRun> fixed_point_runs(const std::filesystem::path& shift, 
 Deviation deviation(const FixedPointRun& run) {
   const files::CellFile cell = files::read_cell(run.cell);
   const auto all = measurement::samples(files::read_recording(run.recording));
-  const auto rows = [&](host_sim::ScalarKind scalar) {
-    return host_sim::run_on_host(cell, all, std::nullopt, scalar).rows;
+  const auto rows = [&](replay::ScalarKind scalar) {
+    return replay::run_on_host(cell, all, std::nullopt, scalar).rows;
   };
-  const auto fixed = rows(host_sim::ScalarKind::fixed), float32 = rows(host_sim::ScalarKind::float32),
-             float64 = rows(host_sim::ScalarKind::float64);
+  const auto fixed = rows(replay::ScalarKind::fixed), float32 = rows(replay::ScalarKind::float32),
+             float64 = rows(replay::ScalarKind::float64);
   Deviation d{all.size()};
   for (std::size_t k = 0; k < all.size(); ++k) {
     d.of_fixed = std::max(d.of_fixed, std::abs(fixed[k].soc - float64[k].soc));
@@ -43,12 +43,12 @@ Deviation deviation(const FixedPointRun& run) {
   return d;
 }
 
-std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run) {
+std::optional<replay::Difference> difference_on_microbit(const FixedPointRun& run) {
   const files::CellFile cell = files::read_cell(run.cell);
   const auto all = measurement::samples(files::read_recording(run.recording));
-  const host_sim::Track host = host_sim::run_on_host(cell, all, std::nullopt, host_sim::ScalarKind::fixed),
-                        board = images::run_on_board(images::emulated_boards().back(), cell, all, std::nullopt);
-  return host_sim::first_difference(host, board, host_sim::ScalarKind::fixed);
+  const replay::Track host = replay::run_on_host(cell, all, std::nullopt, replay::ScalarKind::fixed),
+                      board = images::run_on_board(images::emulated_boards().back(), cell, all, std::nullopt);
+  return replay::first_difference(host, board, replay::ScalarKind::fixed);
 }
 
 }  // namespace bms

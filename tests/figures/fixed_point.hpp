@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "host_sim/replay.hpp"
+#include "replay/replay.hpp"
 
 namespace bms {
 
@@ -30,6 +30,6 @@ struct Deviation {
 Deviation deviation(const FixedPointRun& run);
 
 /// The first word of the microbit that differs from the host, or nothing.
-std::optional<host_sim::Difference> difference_on_microbit(const FixedPointRun& run);
+std::optional<replay::Difference> difference_on_microbit(const FixedPointRun& run);
 
 }  // namespace bms

@@ -5,7 +5,7 @@
 #include "files/cell_file.hpp"
 #include "identification/linear_models.hpp"
 #include "identification/residuals.hpp"
-#include "tests/identification/exact_systems.hpp"
+#include "tests/inference/identification/exact_systems.hpp"
 
 namespace bms {
 

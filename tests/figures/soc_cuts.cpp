@@ -1,4 +1,4 @@
-// The estimator started at 30 places of each real recording: right, wrong and unknown (host_sim/cuts.hpp).
+// The estimator started at 30 places of each real recording: right, wrong and unknown (host_sim/replay/cuts.hpp).
 //
 //   soc_cuts                    prints the tables of all recordings
 //   soc_cuts NAME...            of the recordings whose file name contains a NAME; "shift" is the shipped one
@@ -16,8 +16,8 @@
 #include "files/cell_file.hpp"
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
-#include "host_sim/cuts.hpp"
 #include "measurement/recording.hpp"
+#include "replay/cuts.hpp"
 
 namespace bms {
 namespace {
@@ -40,7 +40,7 @@ std::vector<Case> cases() {
                    std::string_view(name).ends_with("A004")});
   for (const char* name : {"dyn30_N05", "dyn45_P05", "dyn50_P25"})
     all.push_back({data / "a123_esctoolbox" / (std::string(name) + ".csv"), "a123_esctoolbox_extended"});
-  all.push_back({source / "recordings/forklift_shift.csv", "table9"});
+  all.push_back({source / "evidence/recordings/forklift_shift.csv", "table9"});
   return all;
 }
 
@@ -77,18 +77,18 @@ struct Options {
 };
 
 int run(const Options& options) {
-  std::vector<host_sim::CutResult> results, by_last_rest;
-  std::string table = host_sim::cut_heading();
+  std::vector<replay::CutResult> results, by_last_rest;
+  std::string table = replay::cut_heading();
   if (!options.write) fmt::print("{}", table);
   for (const Case& c : cases()) {
     if (!std::filesystem::exists(c.recording) || !chosen(c, options.names)) continue;
     const files::CellFile cell = files::read_cell(options.cell.empty() ? c.cell : options.cell);
     const measurement::Recording recording = files::read_recording(c.recording.string());
-    results.push_back(host_sim::run_cuts(cell, recording, cuts));
-    std::string rows = host_sim::cut_rows(results.back());
-    by_last_rest.push_back(c.ends_empty ? host_sim::run_cuts(cell, ending_at_its_last_rest(recording), cuts)
+    results.push_back(replay::run_cuts(cell, recording, cuts));
+    std::string rows = replay::cut_rows(results.back());
+    by_last_rest.push_back(c.ends_empty ? replay::run_cuts(cell, ending_at_its_last_rest(recording), cuts)
                                         : results.back());
-    if (c.ends_empty) rows += host_sim::cut_rows(by_last_rest.back());
+    if (c.ends_empty) rows += replay::cut_rows(by_last_rest.back());
     table += rows;
     if (!options.write) fmt::print("{}", rows);
     std::fflush(stdout);
@@ -97,7 +97,7 @@ int run(const Options& options) {
     fmt::print(stderr, "soc_cuts: no recording, expected {} or another name\n", data.string());
     return 2;
   }
-  const std::string summary = host_sim::cut_summary(results), better = host_sim::cut_summary(by_last_rest);
+  const std::string summary = replay::cut_summary(results), better = replay::cut_summary(by_last_rest);
   if (options.write) {
     const auto page = source / "docs/figures/soc_trials.md";
     files::replace_figures(page, "cuts", table);

@@ -18,7 +18,7 @@ namespace {
 /// A change to a recording, and the initial state of charge that the estimator receives.
 struct Trouble {
   std::string title;
-  host_sim::SocPrior prior;
+  replay::SocPrior prior;
   double offset_a = 0, gain = 1, offset_v = 0;
   std::optional<double> from_soc;
 };
@@ -46,14 +46,13 @@ struct Sums {
 };
 
 std::string row(const SocTrial& t, Sums& all) {
-  host_sim::ReplayResult r;
+  replay::ReplayResult r;
   r.cell = t.cell;
   r.recording = t.recording;
-  r.track =
-      host_sim::run_on_host(t.cell, measurement::samples(r.recording), host_sim::starting_point(t.prior), r.scalar);
-  host_sim::evaluate(r);
+  r.track = replay::run_on_host(t.cell, measurement::samples(r.recording), replay::starting_point(t.prior), r.scalar);
+  replay::evaluate(r);
   std::vector<float> sigmas;
-  for (const host_sim::EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
+  for (const replay::EstimateRow& e : r.track.rows) sigmas.push_back(static_cast<float>(e.soc_sigma));
   all.samples += sigmas.size();
   all.inside += *r.soc.within_2_sigma * static_cast<double>(sigmas.size());
   all.sigmas.insert(all.sigmas.end(), sigmas.begin(), sigmas.end());
@@ -66,7 +65,7 @@ std::string row(const SocTrial& t, Sums& all) {
 }  // namespace
 
 void each_soc_trial(const std::filesystem::path& data, const std::function<void(const SocTrial&)>& f) {
-  const host_sim::SocPrior right{1, 0.02};
+  const replay::SocPrior right{1, 0.02};
   const std::vector<Trouble> with_sensor_errors = {
       {"initial SOC correct", right, 0, 1, 0, {}}, {"current + 30 mA", right, 0.03, 1, 0, {}},
       {"current - 30 mA", right, -0.03, 1, 0, {}}, {"current + 1 %", right, 0, 1.01, 0, {}},

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "files/cell_file.hpp"
-#include "host_sim/replay.hpp"
 #include "measurement/recording.hpp"
+#include "replay/replay.hpp"
 
 namespace bms {
 
@@ -16,7 +16,7 @@ struct SocTrial {
   std::string name, trouble;
   const files::CellFile& cell;
   measurement::Recording recording;
-  host_sim::SocPrior prior;
+  replay::SocPrior prior;
 };
 
 /// Calls f for each trial with the recordings of data/a123_26650 and data/a123_esctoolbox, and the extended cell file

@@ -28,13 +28,13 @@
 #include "files/recording.hpp"
 #include "files/temporary_folder.hpp"
 #include "files/text_file.hpp"
-#include "host_sim/lanes.hpp"
-#include "host_sim/replay.hpp"
-#include "host_sim/simulation.hpp"
 #include "identification/identify.hpp"
 #include "images/child_process.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
+#include "replay/lanes.hpp"
+#include "replay/replay.hpp"
+#include "replay/simulation.hpp"
 #include "study/study.hpp"
 #include "tests/estimator/duty.hpp"
 #include "tests/figures/fixed_point.hpp"
@@ -47,25 +47,24 @@ namespace bms {
 namespace {
 
 const std::filesystem::path source = BMS_SOURCE_DIR, data = BMS_DATA_DIR;
-const std::string shift = (source / "recordings/forklift_shift.csv").string();
+const std::string shift = (source / "evidence/recordings/forklift_shift.csv").string();
 
 struct Case {
   std::string title, recording, cell;
-  std::optional<host_sim::SocPrior> prior;
+  std::optional<replay::SocPrior> prior;
 };
 
 std::string percent(const std::optional<double>& fraction) {
   return fraction ? fmt::format("{:.2f} %", 100 * *fraction) : "-";
 }
 
-host_sim::ReplayResult replayed(const Case& c) {
-  host_sim::ReplayResult r;
+replay::ReplayResult replayed(const Case& c) {
+  replay::ReplayResult r;
   r.cell = files::read_cell(c.cell);
   r.recording = files::read_recording(c.recording);
   r.target = "host";
-  r.track =
-      host_sim::run_on_host(r.cell, measurement::samples(r.recording), host_sim::starting_point(c.prior), r.scalar);
-  host_sim::evaluate(r);
+  r.track = replay::run_on_host(r.cell, measurement::samples(r.recording), replay::starting_point(c.prior), r.scalar);
+  replay::evaluate(r);
   return r;
 }
 
@@ -74,7 +73,7 @@ const std::string accuracy_heading =
 
 /// One row without its end.
 std::string accuracy_cells(const Case& c) {
-  const host_sim::ReplayResult r = replayed(c);
+  const replay::ReplayResult r = replayed(c);
   return fmt::format("| {} | {} | {} | {} | {} | {:.2f} mV |", c.title, percent(r.soc.rmse), percent(r.soc.max_error),
                      percent(r.soc.rmse_after_30min), percent(r.soc.within_2_sigma),
                      1e3 * r.voltage.prediction_rmse_v.value_or(0));
@@ -85,29 +84,26 @@ std::string accuracy_row(const Case& c) { return accuracy_cells(c) + "\n"; }
 std::string shift_accuracy() {
   std::string table = accuracy_heading + "\n|---|---|---|---|---|---|\n";
   table += accuracy_row({"no initial SOC given (98 %)", shift, "table9", std::nullopt});
-  table += accuracy_row({"initial SOC 98 %, correct", shift, "table9", host_sim::SocPrior{0.98, 0.02}});
-  table += accuracy_row({"initial SOC 78 %, sigma 2 %", shift, "table9", host_sim::SocPrior{0.78, 0.02}});
-  table += accuracy_row({"initial SOC 78 %, sigma 20 %", shift, "table9", host_sim::SocPrior{0.78, 0.2}});
+  table += accuracy_row({"initial SOC 98 %, correct", shift, "table9", replay::SocPrior{0.98, 0.02}});
+  table += accuracy_row({"initial SOC 78 %, sigma 2 %", shift, "table9", replay::SocPrior{0.78, 0.02}});
+  table += accuracy_row({"initial SOC 78 %, sigma 20 %", shift, "table9", replay::SocPrior{0.78, 0.2}});
   return table;
 }
 
 /// The simulated shift, and a real drive that its cell file has not seen.
 std::string headline() {
-  const std::string drive = (source / "recordings/a123_26650/udds_P25_A002.csv.gz").string();
+  const std::string drive = (source / "evidence/recordings/a123_26650/udds_P25_A002.csv.gz").string();
   const char* extended = "a123_26650_extended";
   std::string table = accuracy_heading + "\n|---|---|---|---|---|---|\n";
-  table += accuracy_row({"simulated forklift shift, no initial SOC given (98 %)", shift, "table9", std::nullopt});
-  table += accuracy_row({"the same, initial SOC 78 %, sigma 20 %", shift, "table9", host_sim::SocPrior{0.78, 0.2}});
-  table += accuracy_row(
-      {"measured drive of an A123 cell (UDDS), no initial SOC given (100 %)", drive, extended, std::nullopt});
-  table += accuracy_row({"the same, initial SOC 80 %, sigma 20 %", drive, extended, host_sim::SocPrior{0.8, 0.2}});
+  table += accuracy_row({"**simulated**: forklift shift of eight hours", shift, "table9", std::nullopt});
+  table += accuracy_row({"**measured**: drive of an A123 cell (UDDS)", drive, extended, std::nullopt});
   return table;
 }
 
 /// With the cell file of 25 degrees C, and next to it with the extended one.
 std::string real_row(const std::string& title, const std::string& recording,
-                     const std::optional<host_sim::SocPrior>& prior) {
-  const host_sim::ReplayResult extended = replayed({title, recording, "a123_26650_extended", prior});
+                     const std::optional<replay::SocPrior>& prior) {
+  const replay::ReplayResult extended = replayed({title, recording, "a123_26650_extended", prior});
   return accuracy_cells({title, recording, "a123_26650", prior}) +
          fmt::format(" {} | {} |\n", percent(extended.soc.rmse), percent(extended.soc.within_2_sigma));
 }
@@ -126,7 +122,7 @@ std::string real_accuracy() {
     table += real_row(file.stem().string(), file.string(), std::nullopt);
     if (file.stem() == "udds_P25_A002")
       table += real_row("the same, initial SOC 20 % too low, sigma 20 %", file.string(),
-                        host_sim::SocPrior{r.soc_ref.front() - 0.2, 0.2});
+                        replay::SocPrior{r.soc_ref.front() - 0.2, 0.2});
   }
   return table;
 }
@@ -218,7 +214,7 @@ std::string mechanism_cost() {
   const auto row = [&](const Set& set, bool errors) {
     const files::CellFile cell = table9_with(set, errors);
     const firmware::StepCost cost = firmware::count_instructions(
-        board, images::firmware_image(board.name, cell, images::Image::replay), all, host_sim::state_count(cell));
+        board, images::firmware_image(board.name, cell, images::Image::replay), all, replay::state_count(cell));
     std::string names = errors ? "`noise.errors_are_states`" : "";
     for (const auto& [id, values] : set) names += fmt::format("{}`{}`", names.empty() ? "" : ", ", id);
     table += fmt::format("| {} | {:.0f} | {} |\n", names.empty() ? "nothing" : names, cost.mean, cost.most);
@@ -263,8 +259,8 @@ std::string mechanism_tables() {
 /// The best of several runs, as run_on_host() measures one cell. The cells of a pack differ by 0.2 mV.
 double steps_per_second_in_lanes(const files::CellFile& cell, const measurement::Recording& recording) {
   constexpr int runs = 10;
-  std::vector<measurement::Recording> cells(2 * host_sim::lane_count(), recording);
-  std::vector<host_sim::LaneInput> inputs;
+  std::vector<measurement::Recording> cells(2 * replay::lane_count(), recording);
+  std::vector<replay::LaneInput> inputs;
   for (std::size_t k = 0; k < cells.size(); ++k) {
     std::vector<double> voltage_v = recording.voltage_v.copy();
     for (double& v : voltage_v) v += 2e-4 * static_cast<double>(k);
@@ -272,7 +268,7 @@ double steps_per_second_in_lanes(const files::CellFile& cell, const measurement:
     inputs.push_back({cell, measurement::SampleList(cells[k])});
   }
   double best = 0;
-  for (int k = 0; k < runs; ++k) best = std::max(best, host_sim::run_in_lanes(inputs).steps_per_second);
+  for (int k = 0; k < runs; ++k) best = std::max(best, replay::run_in_lanes(inputs).steps_per_second);
   return best;
 }
 
@@ -281,13 +277,13 @@ std::string speed() {
   const files::CellFile cell = files::read_cell("table9");
   const measurement::Recording recording = files::read_recording(shift);
   const auto all = measurement::samples(recording);
-  for (const host_sim::ScalarKind scalar :
-       {host_sim::ScalarKind::float32, host_sim::ScalarKind::float64, host_sim::ScalarKind::fixed}) {
-    table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", host_sim::name_of(scalar),
-                         host_sim::run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
+  for (const replay::ScalarKind scalar :
+       {replay::ScalarKind::float32, replay::ScalarKind::float64, replay::ScalarKind::fixed}) {
+    table += fmt::format("| replay on the host, {} | {:.1f} million steps/s |\n", replay::name_of(scalar),
+                         replay::run_on_host(cell, all, std::nullopt, scalar).steps_per_second / 1e6);
   }
   table += fmt::format("| replay on the host, float, {} cells in lanes | {:.1f} million steps/s |\n",
-                       2 * host_sim::lane_count(), steps_per_second_in_lanes(cell, recording) / 1e6);
+                       2 * replay::lane_count(), steps_per_second_in_lanes(cell, recording) / 1e6);
   const images::EmulatedBoard& board = images::emulated_boards().front();
   const auto image = images::firmware_image(board.name, cell, images::Image::replay);
   double fastest = 0;
@@ -371,11 +367,11 @@ std::string identification_speed() {
   };
   const auto tables = model::prepare<double, model::max_intervals>(cell.parameters);
   const double simulation_s = fastest_s([&] {
-    host_sim::simulate({.cell = tables,
-                        .capacity_ah = 6,
-                        .time_s = r.data.time_s,
-                        .current_a = r.data.current_a,
-                        .initial_soc = 0.98});
+    replay::simulate({.cell = tables,
+                      .capacity_ah = 6,
+                      .time_s = r.data.time_s,
+                      .current_a = r.data.current_a,
+                      .initial_soc = 0.98});
   });
   std::string table = fmt::format(
       "| 20,000 samples | time | as many simulations |\n|---|---|---|\n| simulation, open loop | {:.2f} ms | 1 |\n",
@@ -428,7 +424,7 @@ void write_front_page() {
 
 /// Figures that depend on the code alone.
 void write_board() {
-  files::replace_figures(source / "protection/README.md", "netduinoplus2", protection_cost());
+  files::replace_figures(source / "firmware/protection/README.md", "netduinoplus2", protection_cost());
   files::replace_figures(source / "estimator/README.md", "netduinoplus2", step_cost());
   files::replace_figures(source / "estimator/README.md", "microbit", microbit_cost());
   files::replace_figures(source / "estimator/README.md", "mechanisms", mechanism_cost());
@@ -452,12 +448,12 @@ void write_accuracy() {
 
 /// On recordings that are not part of the project.
 void write_real_identification() {
-  files::replace_figures(source / "identification/README.md", "real", real_identification());
+  files::replace_figures(source / "inference/identification/README.md", "real", real_identification());
 }
 
 void write_identification() {
   constexpr std::uint64_t bands_seed = 901;
-  const auto readme = source / "identification/README.md";
+  const auto readme = source / "inference/identification/README.md";
   files::replace_figures(readme, "bands", hammerstein_wiener_bands(bands_seed));
   files::replace_figures(readme, "speed", identification_speed());
 }
@@ -472,7 +468,7 @@ void run() {
   } else {
     fmt::print(stderr, "{} does not exist: the figures of real recordings stay unchanged\n", data.string());
   }
-  files::replace_figures(source / "host_sim/README.md", "speed", speed());
+  files::replace_figures(source / "host_sim/replay/README.md", "speed", speed());
   if (std::filesystem::exists(data)) write_real_identification();
   write_identification();
 }
@@ -495,7 +491,8 @@ int main(int argc, char** argv) {
     else if (argc > 1 && std::string_view(argv[1]) == "budgets")
       bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::firmware::board_table());
     else if (argc > 1 && std::string_view(argv[1]) == "protection")
-      bms::files::replace_figures(bms::source / "protection/README.md", "netduinoplus2", bms::protection_cost());
+      bms::files::replace_figures(bms::source / "firmware/protection/README.md", "netduinoplus2",
+                                  bms::protection_cost());
     else if (argc > 1 && std::string_view(argv[1]) == "trials")
       bms::write_trials();
     else if (argc > 1 && std::string_view(argv[1]) == "fixed")

@@ -1,4 +1,4 @@
-// Writes the generated tables of protection/README.md: protections and balancing. The cost on the board:
+// Writes the generated tables of firmware/protection/README.md: protections and balancing. The cost on the board:
 // tests/figures.
 #include <cstdio>
 #include <exception>
@@ -9,7 +9,7 @@
 
 #include "files/committed_figures.hpp"
 #include "protection/table_text.hpp"
-#include "tests/protection/balancing_pack.hpp"
+#include "tests/firmware/protection/balancing_pack.hpp"
 
 namespace bms::protection {
 namespace {
@@ -42,7 +42,7 @@ std::string balancing_table() {
 int main() {
   using namespace bms;
   try {
-    const std::string readme = BMS_SOURCE_DIR "/protection/README.md";
+    const std::string readme = BMS_SOURCE_DIR "/firmware/protection/README.md";
     files::replace_figures(readme, "table", protection::markdown(protection::protection_table(protection::forklift)));
     files::replace_figures(readme, "balancing", protection::balancing_table());
     return 0;

@@ -292,7 +292,7 @@ TEST_F(AttackTest, NobodyCanFillTheFlashSoThatAShortCircuitIsNotLatched) {
 
 /// Lines of records that are not the charge (type 1), which the other figure contains.
 int lines_besides_charge(std::span<const std::uint8_t> flash) {
-  constexpr std::size_t line = 16, type_at = 4, length_at = 6;  // of a record's header, storage/log.hpp
+  constexpr std::size_t line = 16, type_at = 4, length_at = 6;  // of a record's header, firmware/storage/log.hpp
   constexpr std::uint8_t moved = 0x80;  // to this sector, from one that is erased now: its lines would be missing
   int lines = 0;
   for (std::size_t at = 0; at + line <= flash.size();) {

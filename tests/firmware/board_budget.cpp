@@ -18,10 +18,10 @@
 #include "files/text_file.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"
-#include "host_sim/replay.hpp"
 #include "images/emulator.hpp"
 #include "images/firmware_image.hpp"
 #include "images/image_file.hpp"
+#include "replay/replay.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 #include "tests/firmware/stack_depth.hpp"
@@ -32,7 +32,8 @@ namespace bms::firmware {
 namespace {
 
 std::vector<measurement::Sample> two_minutes() {
-  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all =
+      measurement::samples(files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv"));
   return {all.begin() + 3000, all.begin() + 3125};
 }
 
@@ -92,7 +93,7 @@ BudgetRun run_in_qemu(const images::EmulatedBoard& emulated) {
   const auto monitor = folder.path() / "monitor";
   SlcanBoard board(image, {},
                    {"-chardev", "socket,id=monitor,server=on,wait=off,path=" + monitor.string(), "-mon", "monitor",
-                    "-icount", "shift=" + std::string(emulated.scalar == host_sim::ScalarKind::fixed ? "6" : "3")},
+                    "-icount", "shift=" + std::string(emulated.scalar == replay::ScalarKind::fixed ? "6" : "3")},
                    emulated);
   board.read();
   board.write("S6\rO\r");

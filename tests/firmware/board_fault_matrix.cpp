@@ -130,11 +130,11 @@ class Matrix {
     return plan.rules[k].quantity;
   }
 
-  /// The eight hours of recordings/forklift_shift.csv, every second ten times with different noise. There is no fault,
-  /// so none may be published.
+  /// The eight hours of evidence/recordings/forklift_shift.csv, every second ten times with different noise. There is
+  /// no fault, so none may be published.
   static void shift(MatrixResult& result) {
     const std::vector<measurement::Sample> seconds =
-        measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+        measurement::samples(files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv"));
     BoardTruck truck(6, result, 0.98);
     const auto is = [&](const measurement::Sample& at) {
       truck.trajectory = {static_cast<double>(at.current_ua), static_cast<double>(at.voltage_uv),

@@ -1,18 +1,19 @@
 // Runs the fault matrix on the image of a board: the firmware of the forklift board in the emulator, with samples and
-// commands as CAN frames. The oracle of tests/protection (oracle.hpp), which shares no code with the firmware, judges
-// the messages that it sends.
+// commands as CAN frames. The oracle of tests/firmware/protection (oracle.hpp), which shares no code with the firmware,
+// judges the messages that it sends.
 //
 //   cases      for each protection: just below its threshold, just above, noise of three sigma below, around and above
 //              it, and during each other fault. Each case begins with a new board that drives. In addition the
 //              eight-hour shift with noise of three sigma, in which no fault may be published.
 //   time       from the sample with which the condition holds to the message Faults (0x196), and to the message
 //              ContactorState (0x197) with both main contactors open. Frames come with the sample that caused them
-//              (lock step). The latency of the bus is in can/README.md.
+//              (lock step). The latency of the bus is in firmware/can/README.md.
 //   missed     the oracle has a fault that is not published; false: the opposite. Checked for every row that samples
 //              determine, with every sample of every case
 //
-// Overload is compared with the ideal integral, contactor faults with curves of this test (README of protection/).
-// Faults that no frame can cause (a watchdog reset, a failing flash) are tested on the boards in Unicorn.
+// Overload is compared with the ideal integral, contactor faults with curves of this test (README of
+// firmware/protection/). Faults that no frame can cause (a watchdog reset, a failing flash) are tested on the boards in
+// Unicorn.
 #pragma once
 
 #include <cstdint>
@@ -50,7 +51,7 @@ struct MatrixResult {
 /// chosen by the seed. only: just the cases whose name contains this text, traced sample by sample.
 MatrixResult run_fault_matrix(bool every, std::uint64_t seed, unsigned threads, const std::string& only = {});
 
-/// The table of protection/README.md.
+/// The table of firmware/protection/README.md.
 std::string markdown(const MatrixResult& result);
 
 }  // namespace bms::protection

@@ -19,7 +19,7 @@
 #include "hil/board_link.hpp"
 #include "images/firmware_image.hpp"
 #include "tests/firmware/board_fault_matrix.hpp"
-#include "tests/protection/simulated_truck.hpp"
+#include "tests/firmware/protection/simulated_truck.hpp"
 #include "tests/starting_point.hpp"
 
 namespace bms::protection {

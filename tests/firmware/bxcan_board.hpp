@@ -15,7 +15,7 @@
 #include "files/recording.hpp"
 #include "firmware/application.hpp"
 #include "images/firmware_image.hpp"
-#include "tests/can/response_time.hpp"
+#include "tests/firmware/can/response_time.hpp"
 #include "tests/firmware/host_board.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 
@@ -43,7 +43,8 @@ inline const std::filesystem::path& image() {
 /// A part of the recorded shift for sixteen cells. Neighbouring cells differ by a millivolt; their mean is the
 /// recording.
 inline std::vector<Pack> part_of_the_shift(std::size_t count) {
-  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all =
+      measurement::samples(files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv"));
   std::vector<Pack> part(count);
   for (std::size_t k = 0; k < count; ++k) {
     const measurement::Sample& s = all[3000 + k];

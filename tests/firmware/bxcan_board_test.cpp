@@ -5,7 +5,7 @@
 #include <regex>
 
 #include "files/text_file.hpp"
-#include "host_sim/replay.hpp"
+#include "replay/replay.hpp"
 #include "tests/firmware/bxcan_board.hpp"
 
 namespace bms::firmware {
@@ -42,7 +42,7 @@ std::vector<Input> start_of_a_drive(HostBoard& host) {
 }
 
 TEST_F(BxcanBoard, BusHasTheFramesOfTheApplicationBitForBitFromStartToDriving) {
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
+  const measurement::StartingPoint start = replay::starting_point(replay::SocPrior{0.8, 0.05}).value();
   HostBoard host(started_once(), start);
   const auto inputs = start_of_a_drive(host);
   std::map<unsigned, std::vector<can::Frame>> expected;
@@ -143,7 +143,7 @@ TEST_F(BxcanBoard, AfterAMinuteTheFlashIsThatOfTheApplicationBitForBitAndTheNext
   auto part = part_of_the_shift(130);  // one second apart
   for (std::size_t k = 20; k < part.size(); ++k)
     part[k].temperature_cdegc[3] = measurement::no_temperature;  // the fourth sensor breaks: a stored fault
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
+  const measurement::StartingPoint start = replay::starting_point(replay::SocPrior{0.8, 0.05}).value();
   const std::vector<std::uint8_t> stored = flash_after(part, start);
   run_until_it_listens(board);
   board.can.others.push_back({wire_frame(hal::frame_of(start)), 0});

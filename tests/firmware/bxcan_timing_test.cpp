@@ -56,7 +56,7 @@ TEST_F(BxcanBoard, ASampleIsInTheQueueWithinTheTimeThatTheAnalysisTakesForGrante
   EXPECT_GT(longest_ms, 0.02);
   EXPECT_LE(2 * longest_ms, 1e3 * can_bus::sample_to_queue_s);
   EXPECT_GT(minute_ms, longest_ms) << "a record was written after the frames";
-  EXPECT_LE(minute_ms, 20) << "storage/README.md";
+  EXPECT_LE(minute_ms, 20) << "firmware/storage/README.md";
   EXPECT_LE(board.stack_used(), 4U * 1024);
   fmt::print("sample {:.3f} ms, sample with a write to flash {:.2f} ms, stack {} bytes over {} samples\n", longest_ms,
              minute_ms, board.stack_used(), n);

@@ -1,6 +1,6 @@
 // Runs the whole fault matrix in the HIL image of the forklift board: ./bms faults [TEXT]
 //
-//   --write        writes the table to protection/README.md
+//   --write        writes the table to firmware/protection/README.md
 //   --only TEXT    runs the cases whose names contain TEXT, and prints every sample
 //
 // Exit code 1 if a fault is missed, false or late.
@@ -24,7 +24,7 @@ int main(int count, char** words) {
     const std::string table = protection::markdown(result);
     fmt::print("{}{} deviations\n", table, result.wrong.size());
     if (count > 1 && std::strcmp(words[1], "--write") == 0) {
-      files::replace_figures(BMS_SOURCE_DIR "/protection/README.md", "fault matrix", table);
+      files::replace_figures(BMS_SOURCE_DIR "/firmware/protection/README.md", "fault matrix", table);
     }
     return result.wrong.empty() ? 0 : 1;
   } catch (const std::exception& e) {

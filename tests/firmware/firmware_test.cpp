@@ -8,9 +8,9 @@
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
-#include "host_sim/replay.hpp"
 #include "images/firmware_image.hpp"
 #include "images/image_file.hpp"
+#include "replay/replay.hpp"
 #include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/slcan_board.hpp"
 #include "tests/firmware/step_cost.hpp"
@@ -31,7 +31,7 @@ std::filesystem::path microbit_image(images::Image kind) {
 const images::EmulatedBoard& microbit() { return images::emulated_boards().back(); }
 
 std::vector<measurement::Sample> shift() {
-  return measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  return measurement::samples(files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv"));
 }
 
 TEST(FirmwareImage, HasNoDoubleArithmeticHeapExceptionsOrTypeInformation) {
@@ -69,7 +69,7 @@ TEST(FirmwareImage, CostsNoMoreThanTheTableSays) {
 }
 
 TEST(ProtectionImage, CostsNoMoreThanTheTableSaysAndDecidesAsTheHost) {
-  const files::CommittedFigures table(BMS_SOURCE_DIR "/protection/README.md", "netduinoplus2");
+  const files::CommittedFigures table(BMS_SOURCE_DIR "/firmware/protection/README.md", "netduinoplus2");
   const auto measured = protection_figures(images::emulated_boards().front(),
                                            files::read_cell("table9"));  // throws if the board decides otherwise
   ASSERT_FALSE(measured.empty());
@@ -132,9 +132,8 @@ TEST(MicrobitImage, CostsNoMoreThanTheTableSays) {
 TEST(SlcanBoard, TelemetryAgreesWithTheReplay) {
   const auto all = shift();
   const std::vector<measurement::Sample> part(all.begin() + 3000, all.begin() + 4200);
-  const measurement::StartingPoint start = host_sim::starting_point(host_sim::SocPrior{0.8, 0.05}).value();
-  const host_sim::Track host =
-      host_sim::run_on_host(files::read_cell("table9"), part, start, host_sim::ScalarKind::float32);
+  const measurement::StartingPoint start = replay::starting_point(replay::SocPrior{0.8, 0.05}).value();
+  const replay::Track host = replay::run_on_host(files::read_cell("table9"), part, start, replay::ScalarKind::float32);
 
   SlcanBoard board(image(images::Image::application));
   EXPECT_EQ(board.read(), "");  // ready
@@ -146,7 +145,7 @@ TEST(SlcanBoard, TelemetryAgreesWithTheReplay) {
   for (std::size_t k = 0; k < part.size(); ++k) {
     board.send_sample(part[k].time_us, part[k].current_ua, part[k].voltage_uv, part[k].temperature_cdegc);
     const BoardTelemetry t = board.telemetry();
-    const host_sim::EstimateRow& expected = host.rows[k];
+    const replay::EstimateRow& expected = host.rows[k];
     ASSERT_NEAR(t.soc, 5e4 * expected.soc, 0.51) << k;
     ASSERT_NEAR(t.soc_sigma, 5e4 * expected.soc_sigma, 0.51) << k;
     if (k > 0) {

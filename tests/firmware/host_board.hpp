@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "tests/firmware/host_hal.hpp"
-#include "tests/storage/flash_model.hpp"
+#include "tests/firmware/storage/flash_model.hpp"
 
 namespace bms::firmware {
 

@@ -1,6 +1,6 @@
 // The functions of hal/ that the application calls, for tests on this machine. Variables hold what the application has
 // sent, switched and recorded, and what it reads. The flash is in another file (hal/absent/flash.cpp or
-// tests/storage/flash_model.hpp). Also: the application's Board with the cell table9.
+// tests/firmware/storage/flash_model.hpp). Also: the application's Board with the cell table9.
 #pragma once
 
 #include <array>

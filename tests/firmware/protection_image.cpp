@@ -1,6 +1,6 @@
 // Measures the cost of protecting sixteen cells on a board: a thousand samples with all kinds of faults, for the
 // instruction counter. Exit code 0: the board decides as the host.
-#include "tests/protection/scenario.hpp"
+#include "tests/firmware/protection/scenario.hpp"
 
 namespace bms::protection {
 

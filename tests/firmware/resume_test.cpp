@@ -8,8 +8,8 @@
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "files/text_file.hpp"
-#include "host_sim/replay.hpp"
 #include "images/firmware_image.hpp"
+#include "replay/replay.hpp"
 #include "tests/firmware/slcan_board.hpp"
 
 namespace bms::firmware {
@@ -24,7 +24,8 @@ std::filesystem::path image() {
 
 /// Seven minutes of the shift, one sample per second.
 std::vector<measurement::Sample> some_minutes() {
-  const auto all = measurement::samples(files::read_recording(BMS_SOURCE_DIR "/recordings/forklift_shift.csv"));
+  const auto all =
+      measurement::samples(files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv"));
   return {all.begin() + 3'000, all.begin() + 3'420};
 }
 

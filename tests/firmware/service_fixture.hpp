@@ -1,5 +1,5 @@
 // What a truck and a workshop with this pack's keys send, made from the frames that the battery has sent. Written from
-// can/messages.md and authentication/codes.hpp.
+// firmware/can/messages.md and firmware/authentication/codes.hpp.
 #pragma once
 
 #include "authentication/codes.hpp"

@@ -1,5 +1,6 @@
 // The application image in the emulator, connected like a CAN adapter on a serial line. Numbers and identifiers are
-// those of hal/slcan/codec.hpp, hal/sample_frames.hpp and can/greybox_bms.dbc, written a second time on purpose.
+// those of hal/slcan/codec.hpp, hal/sample_frames.hpp and firmware/can/greybox_bms.dbc, written a second time on
+// purpose.
 #pragma once
 
 #include <cstdint>

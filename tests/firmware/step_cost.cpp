@@ -99,10 +99,10 @@ std::vector<std::pair<std::string, double>> core_figures(const images::EmulatedB
                                                          const files::CellFile& cell,
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
-                                           samples, host_sim::state_count(cell));
+                                           samples, replay::state_count(cell));
   const StepCost condition =
       count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
-                         host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
+                         replay::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const ImageSize size = size_of(images::firmware_image(board.name, cell, images::Image::application));
   const auto number = [](std::uint64_t n) { return static_cast<double>(n); };
   return {{"step, mean [instructions]", cost.mean},
@@ -117,10 +117,10 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
                                                          const files::CellFile& cell,
                                                          const std::vector<measurement::Sample>& samples) {
   const StepCost cost = count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay),
-                                           samples, host_sim::state_count(cell));
+                                           samples, replay::state_count(cell));
   const StepCost condition =
       count_instructions(board, images::firmware_image(board.name, cell, images::Image::replay), samples,
-                         host_sim::state_count(cell), "bms::firmware::BoardCell::update_condition(");
+                         replay::state_count(cell), "bms::firmware::BoardCell::update_condition(");
   const StepCost pack = count_instructions(board, images::firmware_image(board.name, cell, images::Image::pack),
                                            "bms::firmware::pack_step(");
   const Footprint f = footprint(images::firmware_image(board.name, cell, images::Image::application));

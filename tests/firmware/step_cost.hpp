@@ -53,7 +53,7 @@ std::vector<std::pair<std::string, double>> step_figures(const images::EmulatedB
 std::vector<std::pair<std::string, StepCost>> filter_form_costs(const images::EmulatedBoard& board,
                                                                 const files::CellFile& cell);
 
-/// Rows of the table in protection/README.md.
+/// Rows of the table in firmware/protection/README.md.
 std::vector<std::pair<std::string, double>> protection_figures(const images::EmulatedBoard& board,
                                                                const files::CellFile& cell);
 

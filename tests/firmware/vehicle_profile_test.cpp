@@ -12,7 +12,7 @@
 namespace bms::firmware {
 namespace {
 
-/// The expected bytes are written by hand, from the layouts that can/messages.md names.
+/// The expected bytes are written by hand, from the layouts that firmware/can/messages.md names.
 TEST_F(TelemetryTest, J1939ProfileAddsMessagesInTheUnitsOfRvc) {
   Application<Board<16>, J1939Profile> with_profile{std::nullopt, {0, 0}, 6, persistence};
   measurement::PackSample<16> pack{};
@@ -66,7 +66,7 @@ TEST_F(TelemetryTest, J1939ProfileAddsMessagesInTheUnitsOfRvc) {
 }
 
 /// With a charger as node 10 of a CANopen bus. The expected bytes are written by hand, from the sources that
-/// can/messages.md names.
+/// firmware/can/messages.md names.
 class ChargerTest : public PackWith<Cia418Profile> {
  protected:
   using Bytes = std::vector<std::uint8_t>;

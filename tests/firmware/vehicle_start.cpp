@@ -1,6 +1,6 @@
-// Measures the times and bytes of can/messages.md with the application: a truck is switched on, drives, is switched
-// off, gets a fault and clears it. Sixteen cells table9 at rest, a sample every 0.1 s, precharge time constant 0.5 s.
-// Prints one JSON object; cmake/dbc_page.py puts it into the page.
+// Measures the times and bytes of firmware/can/messages.md with the application: a truck is switched on, drives, is
+// switched off, gets a fault and clears it. Sixteen cells table9 at rest, a sample every 0.1 s, precharge time constant
+// 0.5 s. Prints one JSON object; cmake/dbc_page.py puts it into the page.
 #include <cmath>
 #include <cstdio>
 #include <string>
@@ -73,7 +73,7 @@ class Truck {
     while (!holds()) {
       pass();
       if (now_s() - begin_s > 60)
-        throw std::runtime_error("an event of can/messages.md does not occur within a minute");
+        throw std::runtime_error("an event of firmware/can/messages.md does not occur within a minute");
     }
     return now_s() - begin_s;
   }

@@ -9,9 +9,9 @@
 
 #include "hal/watchdog.hpp"
 #include "storage/persistence.hpp"
+#include "tests/firmware/storage/flash_model.hpp"
+#include "tests/firmware/storage/record_bytes.hpp"
 #include "tests/fuzz/require.hpp"
-#include "tests/storage/flash_model.hpp"
-#include "tests/storage/record_bytes.hpp"
 
 namespace bms::hal {
 void watchdog_feed() {}

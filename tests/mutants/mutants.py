@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Mutation test: puts small faults into protection/ and storage/, one at a time, and checks that the tests fail.
+"""Mutation test: puts small faults into firmware/protection/ and firmware/storage/, one at a time, and checks that the
+tests fail.
 
     mutants.py BUILD_FOLDER [--count 200] [--seed 1] [--jobs 2] [--report FILE] [--again REPORT]
 
@@ -35,34 +36,35 @@ checkout = pathlib.Path(__file__).resolve().parents[2]
 root = pathlib.Path(tempfile.mkdtemp(prefix="mutants_")) / "source"
 atexit.register(shutil.rmtree, root.parent, ignore_errors=True)
 shutil.copytree(checkout, root, ignore=shutil.ignore_patterns("build*", ".git", "recordings", "corpus"), symlinks=True)
-(root / "recordings").symlink_to(checkout / "recordings")
-sources = sorted(path.relative_to(root).as_posix() for folder in ("protection", "storage")
+(root / "evidence/recordings").symlink_to(checkout / "evidence/recordings")
+sources = sorted(path.relative_to(root).as_posix() for folder in ("firmware/protection", "firmware/storage")
                  for path in (root / folder).iterdir() if path.suffix in (".hpp", ".cpp"))
 
 # Test programs in the order in which they run: test source, its target, further sources.
 # The test with the name of the mutant's file runs first.
-store = ["storage/log.cpp", "storage/persistence.cpp"]
-persistence = ["tests/storage/flash_model.cpp", "tests/storage/fed_watchdog.cpp", *store]
+store = ["firmware/storage/log.cpp", "firmware/storage/persistence.cpp"]
+persistence = ["tests/firmware/storage/flash_model.cpp", "tests/firmware/storage/fed_watchdog.cpp", *store]
 programs = [
-    ("tests/protection/contactors_test.cpp", "protection_test", []),
-    ("tests/protection/derating_test.cpp", "protection_test", []),
-    ("tests/protection/table_test.cpp", "protection_test", []),
-    ("tests/protection/contactor_limits_test.cpp", "protection_test", []),
-    ("tests/protection/contactor_walk_test.cpp", "protection_test", []),
-    ("tests/protection/fault_matrix_test.cpp", "protection_test", []),
-    ("tests/protection/first_cause_test.cpp", "protection_test", []),
-    ("tests/protection/pack_quantities_test.cpp", "protection_test", []),
-    ("tests/protection/sampled_protection_test.cpp", "protection_test", []),
-    ("tests/protection/protection_test.cpp", "protection_test", []),
-    ("tests/protection/missing_samples_test.cpp", "protection_test", []),
-    ("tests/protection/flipped_bits_test.cpp", "protection_test", []),
-    ("tests/protection/balancing_test.cpp", "protection_test", []),
-    ("tests/storage/records_test.cpp", "storage_test", []),
-    ("tests/storage/persistence_test.cpp", "storage_test", persistence),
-    ("tests/storage/persistence_schedule_test.cpp", "storage_test", persistence),
-    ("tests/storage/log_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
-    ("tests/storage/power_cut_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
-    ("tests/storage/worn_flash_test.cpp", "storage_test", ["tests/storage/flash_model.cpp", store[0]]),
+    ("tests/firmware/protection/contactors_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/derating_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/table_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/contactor_limits_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/contactor_walk_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/fault_matrix_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/first_cause_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/pack_quantities_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/sampled_protection_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/protection_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/missing_samples_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/flipped_bits_test.cpp", "protection_test", []),
+    ("tests/firmware/protection/balancing_test.cpp", "protection_test", []),
+    ("tests/firmware/storage/records_test.cpp", "storage_test", []),
+    ("tests/firmware/storage/persistence_test.cpp", "storage_test", persistence),
+    ("tests/firmware/storage/persistence_schedule_test.cpp", "storage_test", persistence),
+    ("tests/firmware/storage/log_test.cpp", "storage_test", ["tests/firmware/storage/flash_model.cpp", store[0]]),
+    ("tests/firmware/storage/power_cut_test.cpp", "storage_test", ["tests/firmware/storage/flash_model.cpp", store[0]]),
+    ("tests/firmware/storage/worn_flash_test.cpp", "storage_test",
+     ["tests/firmware/storage/flash_model.cpp", store[0]]),
     ("tests/firmware/telemetry_test.cpp", "telemetry_test",
      ["tests/firmware/host_hal.cpp", "hal/absent/flash.cpp", *store]),
 ]
@@ -422,7 +424,7 @@ def main():
     caught = len(counted) - len(survived) - len(equivalent)
     print(f"{caught} of {len(counted)} mutants caught ({100 * caught / max(len(counted), 1):.1f} %), {len(equivalent)} "
           f"equivalent, {len(survived)} survived; {rejected} more did not compile; seed {arguments.seed}")
-    for folder in ("protection", "storage"):
+    for folder in ("firmware/protection", "firmware/storage"):
         of = [m for m in counted if m["file"].startswith(folder)]
         print(f"  {folder}: {sum(m['result'].startswith('caught') for m in of)} of {len(of)} caught, "
               f"{sum(m['result'] == 'equivalent' for m in of)} equivalent")

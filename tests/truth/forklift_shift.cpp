@@ -45,9 +45,9 @@ std::string forklift_shift_csv() {
 
   std::string text =
       "# Eight hours of an electric forklift on one LiFePO4 cell of 6 Ah. Simulated, not measured.\n"
-      "# Cell: plant/ (Table 9 made smooth, 6.03 Ah), from soc 0.98 at rest; ambient 18 to 22 degrees C.\n"
-      "# Current: bms experiment forklift_shift, seed 1. Instruments: plant/instruments.hpp, seed 1.\n"
-      "# soc_ref is the true soc. Written by the build target make_forklift_shift; see recordings/README.md.\n"
+      "# Cell: evidence/plant/ (Table 9 made smooth, 6.03 Ah), from soc 0.98 at rest; ambient 18 to 22 degrees C.\n"
+      "# Current: bms experiment forklift_shift, seed 1. Instruments: evidence/plant/instruments.hpp, seed 1.\n"
+      "# soc_ref is the true soc. Written by the build target make_forklift_shift; see evidence/recordings/README.md.\n"
       "time_s,current_a,voltage_v,temperature_c,soc_ref\n";
   for (const RecordedRow& row : record(profile.value(), cell, instruments, {.start_c = 18, .end_c = 22})) {
     append(text, row.time_s, 0, ',');

@@ -1,5 +1,5 @@
-// Makes recordings/forklift_shift.csv: the experiment of that name is the true current of a plant cell, which is
-// measured by imperfect instruments.
+// Makes evidence/recordings/forklift_shift.csv: the experiment of that name is the true current of a plant cell, which
+// is measured by imperfect instruments.
 #pragma once
 
 #include <cstdint>

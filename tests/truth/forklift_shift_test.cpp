@@ -61,8 +61,8 @@ TEST(ForkliftShift, DiffersBySeedAndOtherNamesAreUnknown) {
 
 // No libm, no fused multiply-add, printed by to_chars: equal means equal.
 TEST(ForkliftShift, CommittedRecordingIsWhatTheProgramMakes) {
-  std::ifstream file(BMS_SOURCE_DIR "/recordings/forklift_shift.csv", std::ios::binary);
-  ASSERT_TRUE(file) << "recordings/forklift_shift.csv is missing";
+  std::ifstream file(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv", std::ios::binary);
+  ASSERT_TRUE(file) << "evidence/recordings/forklift_shift.csv is missing";
   std::istringstream made(forklift_shift_csv());
   std::string line, made_line;
   int lines = 0;

@@ -22,7 +22,7 @@
 
 #include "files/recording.hpp"
 #include "hal/sample_frames.hpp"
-#include "host_sim/replay.hpp"
+#include "replay/replay.hpp"
 
 namespace {
 
@@ -97,8 +97,7 @@ int main(int argc, char** argv) {
   const int bus = open_bus(argv[1], bms_ids), noisy = open_bus(argv[2], {});
   if (bus < 0 || noisy < 0) return 1;
   Noise noise(noisy);
-  send(bus,
-       hal::frame_of(host_sim::starting_point(host_sim::SocPrior{std::atof(argv[4]), std::atof(argv[5])}).value()));
+  send(bus, hal::frame_of(replay::starting_point(replay::SocPrior{std::atof(argv[4]), std::atof(argv[5])}).value()));
   std::size_t fed = 0;
   can_frame last{};
   for (const measurement::Sample& sample : measurement::samples(files::read_recording(argv[3]))) {

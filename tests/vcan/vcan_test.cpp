@@ -27,7 +27,7 @@ ToolRun run_shell(const std::string& command) {
 
 /// Writes `count` rows of the forklift shift, from row 3000 on, as a recording.
 void write_part(const std::filesystem::path& path, int count) {
-  std::ifstream in(BMS_SOURCE_DIR "/recordings/forklift_shift.csv");
+  std::ifstream in(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv");
   std::ofstream out(path);
   int row = -1;
   for (std::string line; std::getline(in, line);) {

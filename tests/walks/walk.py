@@ -20,7 +20,7 @@ class Walk:
     def __init__(self, tool, who, goal):
         self.tool, self.who, self.goal = str(pathlib.Path(tool).resolve()), who, goal
         self.folder = pathlib.Path(tempfile.mkdtemp(prefix="walk."))
-        os.symlink(ROOT / "recordings", self.folder / "recordings")
+        os.symlink(ROOT / "evidence", self.folder / "evidence")
         self.steps, self.failed, self.output, self.status = [], 0, "", None
 
     def close(self):

@@ -22,7 +22,7 @@ def walk(who, goal, board=False):
 
 def first_hour(w):
     w.does("Takes the first hour of the recorded shift.")
-    w.cuts("recordings/forklift_shift.csv", "hour.csv", 3600)
+    w.cuts("evidence/recordings/forklift_shift.csv", "hour.csv", 3600)
 
 
 def simulates(w, out, more, recording="hour.csv", initial_soc="0.98"):
@@ -33,7 +33,7 @@ def simulates(w, out, more, recording="hour.csv", initial_soc="0.98"):
 @walk("A battery scientist with the tester's export", "Reads a log with other units, and identifies his cell.")
 def scientist(w):
     w.does("Has a log in milliampere and millivolt, with temperatures in kelvin.")
-    w.cuts("recordings/forklift_shift.csv", "tester.csv", 3600, lambda row: {
+    w.cuts("evidence/recordings/forklift_shift.csv", "tester.csv", 3600, lambda row: {
         "Time (s)": row["time_s"], "Current (mA)": f"{1000 * float(row['current_a']):.0f}",
         "Voltage (mV)": f"{1000 * float(row['voltage_v']):.0f}",
         "Temperature (K)": f"{273.15 + float(row['temperature_c']):.2f}"})
@@ -85,7 +85,7 @@ def technician(w):
 @walk("A technician who suspects the current sensor", "Must not correct a good sensor.")
 def ammeter(w):
     w.does("A cell with an internal short circuit; the sensor is perfect.")
-    simulates(w, "shift.csv", "--with leakage:current_a=0.25 --noise-v 0.001", "recordings/forklift_shift.csv")
+    simulates(w, "shift.csv", "--with leakage:current_a=0.25 --noise-v 0.001", "evidence/recordings/forklift_shift.csv")
     w.runs("bms ammeter shift.csv --cell table9")
     w.exits(0)
     w.sees("The charge balance is short by 2[0-9][0-9] mA")
@@ -98,7 +98,7 @@ def ammeter(w):
 def extended(w):
     first_hour(w)
     for cell in ("a123_26650_extended", "a123_esctoolbox_extended"):
-        w.cuts("recordings/forklift_shift.csv", "small.csv", 3000, lambda row: {
+        w.cuts("evidence/recordings/forklift_shift.csv", "small.csv", 3000, lambda row: {
             "time_s": row["time_s"], "current_a": f"{0.4 * float(row['current_a']):.4f}",
             "temperature_c": row["temperature_c"]})
         w.runs(f"bms simulate --cell {cell} --profile small.csv --initial-soc 1 --out z.csv")
@@ -122,7 +122,7 @@ def extended(w):
 
 @walk("An impatient user", "Ctrl-C gives no verdict.")
 def impatient(w):
-    w.cuts("recordings/forklift_shift.csv", "morning.csv", 12000)
+    w.cuts("evidence/recordings/forklift_shift.csv", "morning.csv", 12000)
     simulates(w, "monday.csv", "--with leakage:current_a=0.12 --noise-v 0.001", "morning.csv")
     w.runs("bms diagnose --cell table9 --recording monday.csv --initial-soc 0.98 --out x.toml --json r.json",
            interrupt_at_cpu_s=0.6)
@@ -145,7 +145,7 @@ def pack_csv(recording_rows, cells, change):
 def pack(w):
     first_hour(w)
     rows = []
-    w.cuts("recordings/forklift_shift.csv", "hour.csv", 3600, lambda row: rows.append(row) or row)
+    w.cuts("evidence/recordings/forklift_shift.csv", "hour.csv", 3600, lambda row: rows.append(row) or row)
     spread = lambda n, k: 1e-3 * (((7919 * n + 104729 * k) % 2001) / 1000 - 1) + 2e-4 * n
     w.writes("good.csv", pack_csv(rows, 8, lambda n, k, a, v: v + spread(n, k)))
     w.writes("bad.csv", pack_csv(rows, 8, lambda n, k, a, v: v + spread(n, k) + (0.006 * a if n == 3 else 0)))
@@ -211,7 +211,7 @@ def mistakes(w):
         w.sees(pattern)
         w.expects("one line", len(w.output.strip().splitlines()) == 1)
     w.does("Has a download that broke off.")
-    whole = (w.folder / "recordings/a123_26650/udds_P25_A002.csv.gz").read_bytes()
+    whole = (w.folder / "evidence/recordings/a123_26650/udds_P25_A002.csv.gz").read_bytes()
     (w.folder / "cut.csv.gz").write_bytes(whole[:20000])
     w.runs("bms replay cut.csv.gz --cell a123_26650")
     w.exits(2)
@@ -220,7 +220,7 @@ def mistakes(w):
 
 @walk("A technician with the battery's own CAN log", "The log needs no options; missing readings are missing.", True)
 def own_log(w):
-    w.cuts("recordings/forklift_shift.csv", "part.csv", 400)
+    w.cuts("evidence/recordings/forklift_shift.csv", "part.csv", 400)
     w.runs("bms hil --board stm32f405_forklift --cell table9 --cells 8 --profile part.csv --sample-s 1 "
            "--fault cell_open=3@200-260 --candump truck.log")
     w.runs("bms import truck.log --out truck.csv")
@@ -239,7 +239,7 @@ def own_log(w):
 
 @walk("A firmware engineer", "Runs the firmware in the loop with a broken wire, and looks at the page.", True)
 def firmware(w):
-    w.cuts("recordings/forklift_shift.csv", "part.csv", 400)
+    w.cuts("evidence/recordings/forklift_shift.csv", "part.csv", 400)
     w.runs("bms hil --board stm32f405_forklift --cell table9 --profile part.csv --sample-s 1 "
            "--fault cell_open=3@200-260 --report loop.html --json loop.json")
     w.exits(0)

@@ -190,7 +190,7 @@ class FailureCase {
 
  private:
   static std::vector<Row> rows() {
-    return promised_rows(BMS_SOURCE_DIR "/protection/README.md", truck_ah / printed_ah);
+    return promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah);
   }
 
   /// Closed by the outputs, and not by a weld.

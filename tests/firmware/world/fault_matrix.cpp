@@ -347,7 +347,7 @@ std::string table_of(const std::vector<Row>& rows, const std::vector<Outcome>& o
 
 Result run_fault_matrix(const Extent& extent) {
   const Pack pack = pack_of(printed_ah);
-  const std::vector<Row> rows = promised_rows(BMS_SOURCE_DIR "/protection/README.md");
+  const std::vector<Row> rows = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md");
   const std::vector<Cause> causes = other_causes();
   const std::vector<Background> background = backgrounds();
   Cases cases(extent.at_once);

@@ -16,7 +16,7 @@ struct Pack {
 };
 /// Builds the image of the forklift board for this pack, if it is not there yet.
 Pack pack_of(double capacity_ah, std::size_t cells = 16);
-/// Cells of a small forklift, and the cell whose thresholds protection/README.md prints.
+/// Cells of a small forklift, and the cell whose thresholds firmware/protection/README.md prints.
 inline constexpr double truck_ah = 100, printed_ah = 6;
 
 /// Components at random within their tolerances, with dividers of 0.1 %. The supply rail does not react to the coils.

@@ -1,7 +1,7 @@
 // What the firmware promises, and a judge of whether it does it.
 //
-// The promise is the table of protections in protection/README.md, read as text. The judge knows the true voltages,
-// currents and temperatures, and compares with them what is published on the bus:
+// The promise is the table of protections in firmware/protection/README.md, read as text. The judge knows the true
+// voltages, currents and temperatures, and compares with them what is published on the bus:
 //
 //   missed   a quantity was beyond its threshold by more than the tolerance of its measurement, without a break, for
 //            the delay of the row and the time of the measuring chain, and the fault is not published

@@ -18,7 +18,8 @@ class Shift {
   Shift(const Pack& pack, std::uint64_t seed, Outcome& outcome)
       : pack_(pack),
         world_(pack.image, random_setup(pack, seed)),
-        judge_(world_, promised_rows(BMS_SOURCE_DIR "/protection/README.md", truck_ah / printed_ah), pack.limit_a),
+        judge_(world_, promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah),
+               pack.limit_a),
         random_(seed + 7),
         outcome_(outcome) {
     world_.set_noise(cell_noise_v, shunt_noise_v);

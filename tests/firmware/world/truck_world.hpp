@@ -1,5 +1,5 @@
 // The flashed image of the forklift board in a truck: the emulated core with its ports, ADC, I2C and CAN, the model of
-// the front end, and the circuit of battery, contactors and truck (plant/circuit). Wired as
+// the front end, and the circuit of battery, contactors and truck (evidence/plant/circuit). Wired as
 // boards/stm32f405_forklift/README.md says.
 //
 // Nothing here knows states, thresholds or sequences of the firmware: it sees levels of pins and frames on the bus. One

@@ -1,5 +1,5 @@
 // The truck's controller on the bus: it repeats its request each second and reads what the board publishes. Frames are
-// read by the layout of can/greybox_bms.dbc. The generated packing is used for the commands only.
+// read by the layout of firmware/can/greybox_bms.dbc. The generated packing is used for the commands only.
 #pragma once
 
 #include <array>

@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(Cells, PackSize, ::testing::Values(8, 15));
 
 /// The promise is read from the page as it is printed.
 TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
-  const auto rows = promised_rows(BMS_SOURCE_DIR "/protection/README.md");
+  const auto rows = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md");
   ASSERT_GE(rows.size(), 32U);
   EXPECT_EQ(rows[2].name, "cell overvoltage severe");
   EXPECT_EQ(rows[2].quantity, "highest cell");

@@ -1,0 +1,8 @@
+#include "replay/replay_run.hpp"
+
+namespace bms::replay {
+
+template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples,
+                          const std::optional<measurement::StartingPoint>& start, Timing timing);
+
+}  // namespace bms::replay

@@ -1,8 +1,0 @@
-#include "host_sim/replay_run.hpp"
-
-namespace bms::host_sim {
-
-template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples,
-                          const std::optional<measurement::StartingPoint>& start, Timing timing);
-
-}  // namespace bms::host_sim

@@ -1,0 +1,54 @@
+// Whether a cause stands out from what healthy recordings of the cell show as well
+// (inference/healthy_data/healthy_data.hpp).
+//
+// The gain of each cause is divided by its usual level on the healthy blocks. The largest of these ratios on a
+// healthy block, with the levels of the other blocks, is what chance and model error reach on a healthy recording
+// whatever the cause. A cause is named if its own ratio is larger than that at the false alarm rate: with enough blocks
+// by its rank among them (conformal), otherwise by a Student distribution of the blocks' logarithms.
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "healthy_data/healthy_data.hpp"
+
+namespace bms::diagnosis {
+
+/// What healthy data say of one cause.
+struct HealthyComparison {
+  bool stands_out = false;
+  double false_alarm = 1;   ///< probability that a healthy recording shows as much of any cause
+  double healthy_gain = 0;  ///< the largest of this cause on a healthy block, for a recording of this duration
+  /// With so many hours of healthy recordings like these it would be named; nothing: healthy recordings show as much.
+  std::optional<double> hours_needed;
+};
+
+/// Healthy recordings [h], each as long as duration_h, that would let a cause of this gain stand out if they
+/// showed nothing of it.
+double hours_if_none_shows_any(double gain, double duration_h, double rate);
+
+class HealthyNull {
+ public:
+  /// rate: of false alarms, 0 < rate < 1. duration_s: of the recordings to be diagnosed; gain grows with it.
+  HealthyNull(const healthy_data::HealthyData& healthy, double rate, double duration_s);
+
+  /// gain: of a cause in the recordings that are diagnosed, >= 0.
+  HealthyComparison compare(const std::string& cause, double gain) const;
+  /// The smallest gain of a cause that would stand out; nothing with too few blocks.
+  std::optional<double> gain_needed(const std::string& cause) const;
+  double hours() const { return hours_; }
+  std::size_t blocks() const { return level_of_block_.size(); }
+
+ private:
+  /// ln of gain over the usual level of the cause.
+  double log_ratio(const std::string& cause, double gain) const;
+  double gain_of(std::size_t block, const std::string& cause) const;
+
+  std::vector<healthy_data::HealthyBlock> blocks_;  ///< their gain as in a recording of the duration to be diagnosed
+  std::vector<double> level_of_block_;              ///< largest log ratio of any cause, by block
+  double rate_, hours_, mean_ = 0, spread_ = 0;
+};
+
+}  // namespace bms::diagnosis

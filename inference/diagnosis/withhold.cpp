@@ -1,0 +1,165 @@
+#include "diagnosis/withhold.hpp"
+
+#include <algorithm>
+
+#include "diagnosis/healthy_coverage.hpp"
+#include "diagnosis/one_current.hpp"
+#include "diagnosis/thresholds.hpp"
+#include "diagnosis/true_current.hpp"
+
+namespace bms::diagnosis {
+
+namespace {
+
+constexpr const HealthyThresholds& withhold_limits = thresholds.healthy;
+
+double total_duration_s(const std::vector<PreparedRecording>& records) {
+  double sum_s = 0;
+  for (const PreparedRecording& r : records) sum_s += r.duration_s();
+  return sum_s;
+}
+
+bool is_of_current(std::size_t m) {
+  return m == model::mechanism_index_of<model::CurrentGain> || m == model::mechanism_index_of<model::CurrentOffset>;
+}
+
+}  // namespace
+
+double largest_error_v(const healthy_data::HealthyData& healthy) {
+  double largest_v = 0;
+  for (const healthy_data::HealthyBlock& b : healthy.blocks) largest_v = std::max(largest_v, b.error_v);
+  return largest_v;
+}
+
+std::vector<MechanismGain> gains_of(const Grown& grown, const Survivors& survivors) {
+  std::map<std::size_t, double> gains = grown.gains;
+  for (const auto& [m, gain] : survivors.gains) gains[m] = std::max(gains[m], gain);
+  std::vector<MechanismGain> list;
+  for (const auto& [m, gain] : gains) {
+    if (gain > 0) list.push_back({m, gain});
+  }
+  return list;
+}
+
+double unknown_gain(const ResidualTest& residual) {
+  return thresholds.decision.detected * std::max({residual.gain / thresholds.adequacy.unexplained,
+                                                  residual.far_out / thresholds.adequacy.far_out, 0.0});
+}
+
+HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
+                           const Scope& scope, const healthy_data::HealthyData& healthy, double false_alarm_rate)
+    : search_(search),
+      likelihood_(likelihood),
+      control_(control),
+      scope_(scope),
+      healthy_(healthy),
+      as_read_(coverage_of(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
+      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
+      null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
+
+bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }
+
+HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) const {
+  const std::string cause = mechanism == no_mechanism ? std::string(healthy_data::unknown_cause)
+                                                      : std::string(model::catalogue[mechanism].id);
+  HealthyComparison c = null_.compare(cause, gain);
+  if (!is_covered()) c.stands_out = false;
+  return c;
+}
+
+std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
+  using AlarmAndGain = std::pair<double, double>;
+  const std::size_t least =
+      least_of_those_that_go(found.best.hypothesis.added(), [&](std::size_t m) -> std::optional<AlarmAndGain> {
+        const HealthyComparison c = compare(m, found.gains.at(m));
+        if (c.stands_out) return std::nullopt;
+        return AlarmAndGain(-c.false_alarm, found.gains.at(m));
+      });
+  if (least == no_mechanism) return std::nullopt;
+  const double gain = found.gains.at(least);
+  return Withheld{least, *found.best.hypothesis.find(least), gain, compare(least, gain), false};
+}
+
+HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
+  const std::vector<std::size_t> added = fit.hypothesis.added();
+  if (std::none_of(added.begin(), added.end(), is_of_current)) return {};
+  if (fitted_error_v(likelihood_, fit) > withhold_limits.gross_times * largest_error_v(healthy_)) return {};
+  return coverage_of(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
+}
+
+void HealthyJudge::cover_true_current(const Survivors& found) {
+  basis_.covered = as_read_;
+  if (is_covered()) return;
+  const auto take_if_more = [&](HealthyCoverage c) {
+    if (c.share > basis_.covered.share) basis_.covered = std::move(c);
+  };
+  take_if_more(covered_by(found.best));
+  const double reach = has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah)
+                           ? thresholds.decision.tie_inseparable
+                           : thresholds.decision.tie;
+  for (const auto& [m, rivals] : found.rivals) {
+    for (const HypothesisFit& rival : rivals) {
+      if (search_.score(rival) - search_.score(found.best) < reach) take_if_more(covered_by(rival));
+    }
+  }
+}
+
+Survivors HealthyJudge::nothing_of(const Survivors& found) {
+  for (Withheld& w : withheld_) w.not_covered = true;
+  for (const std::size_t m : found.best.hypothesis.added())
+    withheld_.push_back({m, *found.best.hypothesis.find(m), found.gains.at(m), compare(m, found.gains.at(m)), true});
+  return {control_, {}, {}, {}};
+}
+
+Survivors HealthyJudge::with_current_sensor(Survivors found) {
+  std::vector<std::size_t> sensor = scope_.searched;
+  std::erase_if(sensor, [](std::size_t m) { return !is_of_current(m); });
+  const std::vector<HypothesisFit> fits = search_.one_more(control_, sensor);
+  if (fits.empty() || search_.score(fits.front()) >= search_.score(found.best)) return found;
+  return eliminate(search_, likelihood_, control_, fits.front(), scope_);
+}
+
+Survivors HealthyJudge::without_withheld(Survivors found) {
+  cover_true_current(found);
+  if (!is_covered()) {
+    found = with_current_sensor(std::move(found));
+    cover_true_current(found);
+  }
+  if (!is_covered()) return nothing_of(found);
+  for (bool removed = true; removed;) {
+    removed = false;
+    while (std::optional<Withheld> least = least_of(found)) {
+      std::erase(scope_.searched, least->mechanism);
+      scope_.expected.erase(least->mechanism);
+      found = without_one(search_, control_, found, least->mechanism);
+      withheld_.push_back(*std::move(least));
+      removed = true;
+    }
+    if (found.best.hypothesis.added().empty()) break;
+    if (removed) found = eliminate(search_, likelihood_, control_, found.best, scope_);
+  }
+  if (!withheld_.empty()) cover_true_current(found);
+  return is_covered() ? found : nothing_of(found);
+}
+
+std::optional<double> HealthyJudge::gain_needed(std::size_t mechanism) const {
+  if (!is_covered()) return std::nullopt;
+  return null_.gain_needed(std::string(model::catalogue[mechanism].id));
+}
+
+void HealthyJudge::withhold_unknown(Adequacy& adequacy) {
+  if (!adequacy.unknown) return;
+  const double gain = unknown_gain(adequacy.residual);
+  const HealthyComparison c = compare(no_mechanism, gain);
+  if (c.stands_out) return;
+  adequacy.unknown = false;
+  withheld_.push_back({no_mechanism, {}, gain, c, !is_covered()});
+}
+
+std::vector<Withheld> HealthyJudge::withheld() const {
+  std::vector<Withheld> list = withheld_;
+  std::stable_sort(list.begin(), list.end(), [](const Withheld& a, const Withheld& b) { return a.gain > b.gain; });
+  return list;
+}
+
+}  // namespace bms::diagnosis
