@@ -142,7 +142,7 @@ class FirstState {
             sum_variance<Model>(of_states, h, [](std::size_t k) { return k == 0 || k >= Model::first_voltage; });
         return Variance(Variance(rest_v2 + unknown_v * unknown_v) + of_polarisation);
       };
-      return {there, left.state[0] + Model::sum_v(left.state), variance(left),
+      return {there, left.state[0] + Model::sum_v(laws_of(cell), left.state), variance(left),
               variance(warm ? left : StartState{left.state, charged_v})};
     }
   };

@@ -1,6 +1,8 @@
 // The 1RC model with a set of mechanisms, as the filter steps it: states v_rc, the mechanisms' voltages, SOC.
 //
-//   Voltages          states of mechanisms that add to the voltage and that the filter corrects
+//   Voltages          states of mechanisms that add to the voltage and that the filter corrects. With laws that are
+//                     chosen at run time, places for at most as many: those without a state are decoupled and change no
+//                     bit of the others
 //   MechanismStates   all states of mechanisms; those that are not corrected (a temperature rise) come last
 //   Errors            whether two persistent errors are states as well: the amount by which the model's voltage is too
 //                     low [V], and the amount by which the current reads too high, in capacities per hour [1/h]. Both
@@ -155,7 +157,7 @@ struct ExtendedRc {
     static constexpr Voltage<S> voltage(const SomeLaws& laws, const State& x, const TablePoint<S>& at,
                                         const StepInput<S>& input) {
       Voltage<S> v = Base::voltage({x[0]}, at, input);
-      if constexpr (Voltages > 0 || Errors) v = Voltage<S>(v + sum_v(x));
+      if constexpr (Voltages > 0 || Errors) v = Voltage<S>(v + sum_v(laws, x));
       return laws.reading(v);
     }
 
@@ -166,11 +168,15 @@ struct ExtendedRc {
       return ratio<Voltage<S>>(Voltage<S>(read_v - laws.reading(Voltage<S>(0))), gain(laws));
     }
 
-    static constexpr Voltage<S> sum_v(const State& x) {
+    template <class SomeLaws>
+    static constexpr Voltage<S> sum_v(const SomeLaws& laws, const State& x) {
       Voltage<S> sum(0);
       if constexpr (Errors) sum = x[voltage_error];
+      const std::size_t count = voltages(laws);
 #pragma GCC unroll 8
-      for (std::size_t k = 0; k < Voltages; ++k) sum = Voltage<S>(sum + x[first_mechanism_state + k]);
+      for (std::size_t k = 0; k < Voltages; ++k) {
+        if (k < count) sum = Voltage<S>(sum + x[first_mechanism_state + k]);
+      }
       return sum;
     }
 
@@ -213,6 +219,11 @@ struct ExtendedRc {
 #pragma GCC unroll 8
         for (std::size_t k = 0; k < Voltages; ++k)
           h[first_voltage + k] = VoltagePerSoc<S>(h[first_voltage + k] + at.shifted_ocv_slope_v * ahead[k]);
+      }
+      const std::size_t count = voltages(laws);
+#pragma GCC unroll 8
+      for (std::size_t k = 0; k < Voltages; ++k) {
+        if (k >= count) h[first_voltage + k] = VoltagePerSoc<S>(0);
       }
       h[soc] = base[1];
       if (laws.changes_reading()) {
@@ -284,14 +295,15 @@ struct ExtendedRc {
       v[0] = Voltage<S>(at.r1_ohm * input.current_a);
       if constexpr (Voltages > 0) {
         const auto discretisation = laws.discretise(mechanism_states(x), at, input);
-        for (std::size_t k = 0; k < Voltages; ++k) v[1 + k] = discretisation[k].target;
+        for (std::size_t k = 0; k < voltages(laws); ++k) v[1 + k] = discretisation[k].target;
       }
       return v;
     }
     /// Whether state k of the covariance, before the SOC, relaxes with a time constant.
     template <class SomeLaws>
     static constexpr bool is_polarisation(const SomeLaws& laws, std::size_t k) {
-      return k == 0 || (k >= first_voltage && !laws.starts_with_own_sigma(k - first_voltage));
+      return k == 0 || (k >= first_voltage && k < first_voltage + voltages(laws) &&
+                        !laws.starts_with_own_sigma(k - first_voltage));
     }
     /// Polarisation x at one SOC, as it would be at another one. here, there: final_voltages() at both.
     static constexpr State polarisation_at(State x, const std::array<Voltage<S>, 1 + Voltages>& here,
@@ -305,6 +317,14 @@ struct ExtendedRc {
     }
 
    private:
+    /// Voltage states that there are, of the places for them.
+    template <class SomeLaws>
+    static constexpr std::size_t voltages(const SomeLaws& laws) {
+      if constexpr (SomeLaws::all_act)
+        return Voltages;
+      else
+        return laws.voltage_states();
+    }
     /// v times numerator / denominator, both of the same sign; 2 V at most.
     static constexpr Voltage<S> scaled_by(const Voltage<S>& v, const Voltage<S>& numerator,
                                           const Voltage<S>& denominator) {

@@ -20,14 +20,16 @@ namespace bms::model {
 
 namespace extended_detail {
 
-/// The law of a slot.
+/// The law of a slot, and whether the slot may be empty.
 template <class Slot>
 struct LawIn {
   using type = Slot;
+  static constexpr bool optional = false;
 };
 template <class Law>
 struct LawIn<std::optional<Law>> {
   using type = Law;
+  static constexpr bool optional = true;
 };
 
 template <class Law>
@@ -76,6 +78,7 @@ class LawSet {
       (false || ... || extended_detail::shifts_ocv_soc<typename extended_detail::LawIn<Slots>::type, S>());
   static constexpr bool scales_states =
       (false || ... || extended_detail::scales_state<typename extended_detail::LawIn<Slots>::type, S>());
+  static constexpr bool all_act = !(false || ... || extended_detail::LawIn<Slots>::optional);
   using States = std::array<Voltage<S>, most_states>;
   using Relaxations = std::array<Relaxation<S>, most_states>;
 
@@ -207,10 +210,14 @@ class LawSet {
     });
     return x;
   }
-  /// The relaxation of each state in a step. x: the laws' states before it.
+  /// The relaxation of each state in a step; in places without a state, nothing moves and any error decays at once.
+  /// x: the laws' states before it.
   template <class X>
   constexpr Relaxations discretise(const X& x, const TablePoint<S>& at, const StepInput<S>& input) const {
     Relaxations r{};
+    if constexpr (!all_act) {
+      for (Relaxation<S>& unused : r) unused.error_decay = Fraction<S>(1);
+    }
     each_with_states([&](const auto& law, std::size_t first) {
       for (std::size_t i = 0; i < states_of(law); ++i) r[first + i] = relaxation(law, i, at, input, &x[first]);
     });

@@ -1,7 +1,7 @@
 // Replays a recording through the estimator with one scalar type.
 //
-// The estimator is compiled for every number of states that a cell file may ask for, and for each scalar. This takes
-// half a minute, so each scalar has a source of its own. In fixed point the estimator consists of many small functions,
+// The estimator is compiled for two numbers of states, and for each scalar: twelve and more seconds, so each scalar has
+// a source of its own. In fixed point the estimator consists of many small functions,
 // and inlining all of them takes a minute of compile time: the estimators with mechanisms are compiled apart, with
 // little inlining.
 #pragma once
@@ -120,15 +120,18 @@ Track run_estimator(const Cell& cell, const measurement::SampleList& samples,
   return track;
 }
 
-/// Runs the estimator with as many states as the mechanisms of the cell have voltages.
-template <class S, bool Errors, std::size_t Voltages = 0>
+/// Places for voltages of mechanisms, besides as many as there can be: as the built-in extended cells have.
+inline constexpr std::size_t usual_voltages = 3;
+
+/// Places that are left do not change the estimates.
+template <class S, bool Errors, std::size_t Voltages = usual_voltages>
 Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
                    const measurement::SampleList& samples, const std::optional<measurement::StartingPoint>& start,
                    Timing timing) {
   using Laws = model::ChosenLaws<S>;
   if constexpr (Voltages < Laws::most_voltage_states) {
     if (cell.laws.voltage_states() > Voltages)
-      return run_extended<S, Errors, Voltages + 1>(cell, samples, start, timing);
+      return run_extended<S, Errors, Laws::most_voltage_states>(cell, samples, start, timing);
   }
   return run_estimator<estimator::SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(
       cell, samples, start, (Errors ? error_values : 0) + cell.laws.states(), timing);

@@ -28,11 +28,11 @@ using Laws = model::ChosenLaws<float>;
 /// Evaluated here: within the template below, g++ 14 has not yet instantiated the functions that it needs.
 constexpr std::size_t most_voltages = Laws::most_voltage_states;
 
-/// With as many states as the mechanisms of the cell have voltages.
-template <bool Errors, std::size_t Voltages = 0>
+/// As replay_detail::run_extended().
+template <bool Errors, std::size_t Voltages = replay_detail::usual_voltages>
 std::unique_ptr<Stepper> extended(const Extended& cell, const std::optional<measurement::StartingPoint>& start) {
   if constexpr (Voltages < most_voltages) {
-    if (cell.laws.voltage_states() > Voltages) return extended<Errors, Voltages + 1>(cell, start);
+    if (cell.laws.voltage_states() > Voltages) return extended<Errors, most_voltages>(cell, start);
   }
   using Estimator = estimator::SocEstimator<float, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>;
   return std::make_unique<SteppedEstimator<Estimator, Extended>>(cell, start);

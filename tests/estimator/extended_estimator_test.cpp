@@ -212,6 +212,27 @@ auto run_with_errors(const std::vector<MechanismSetting>& mechanisms, const std:
   return estimates;
 }
 
+/// The host has places for more voltages than most cells need. One of those that are left is the place of a
+/// temperature.
+template <class S>
+void expect_the_same_bits_with_places_left() {
+  const std::vector<MechanismSetting> mechanisms =
+      usual({"ocv_hysteresis", "slow_polarisation", "temperature_resistance", "self_heating"});
+  const Cells<S> cell = table9_with_errors<S, 3>(mechanisms);
+  ASSERT_EQ(cell.laws.voltage_states(), 3U);
+  ASSERT_EQ(cell.laws.states(), 4U);
+  const Work w = work(mechanisms, 3'000, 0.93);
+  for (const double sigma : {0.005, 0.2}) {  // known, and ambiguous
+    const auto exact = run_with_errors<S, 3>(mechanisms, w.samples, starting_at(0.9, sigma));
+    const auto wide = run_with_errors<S, 5>(mechanisms, w.samples, starting_at(0.9, sigma));
+    for (std::size_t k = 0; k < exact.size(); ++k) ASSERT_EQ(words(exact[k]), words(wide[k])) << k;
+  }
+}
+TEST(ExtendedEstimator, PlacesWithoutAStateChangeNoBit) {
+  expect_the_same_bits_with_places_left<float>();
+  expect_the_same_bits_with_places_left<FixedPoint>();
+}
+
 TEST(ExtendedModel, ErrorsAsStatesChangeNothingElse) {
   constexpr std::size_t voltages = 3;
   using Plain = ExtendedRc<voltages, mechanism_state_count>::Of<double>;
