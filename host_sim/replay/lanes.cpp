@@ -1,11 +1,11 @@
 #include "replay/lanes.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <memory>
 #include <utility>
 
 #include "replay/lane_run.hpp"
+#include "replay/processor_time.hpp"
 
 namespace bms::replay {
 
@@ -71,9 +71,9 @@ double run_group(std::span<const LaneInput> inputs, std::span<const std::size_t>
       const std::size_t from = std::min(row, words[lane].size());
       blocks[lane] = {inputs[group[lane]].samples.part(from, block_rows, space[lane]), words[lane].data() + from};
     }
-    const auto begin = std::chrono::steady_clock::now();
+    const double begin_s = processor_time_s();
     run->run(blocks);
-    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    seconds += processor_time_s() - begin_s;
   }
   result.alone += run->single_steps();
   for (std::size_t lane = 0; lane < group.size(); ++lane) {

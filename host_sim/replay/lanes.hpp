@@ -28,7 +28,7 @@ struct LaneTracks {
   std::vector<Track> tracks;    ///< in the order of the inputs
   std::size_t steps = 0;        ///< of all cells in lanes
   std::size_t alone = 0;        ///< of these, those that the estimator of one cell computed
-  double steps_per_second = 0;  ///< of one cell, all cells in lanes together
+  double steps_per_second = 0;  ///< of processor time; of one cell, all cells in lanes together
 };
 
 /// Number of cells whose steps are computed together.

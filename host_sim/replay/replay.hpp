@@ -80,7 +80,7 @@ struct Track {
   std::vector<double> state_scales;        ///< factor from the number in a word to the unit in the name
   std::vector<std::uint32_t> state_words;  ///< state_names.size() for each row; empty for double
   std::vector<double> state_numbers;       ///< the same, of double
-  double steps_per_second = 0;
+  double steps_per_second = 0;             ///< of processor time; of an emulator: of wall time
 
   /// A further state, from 0, in V, K or A.
   double state(std::size_t row, std::size_t index) const;

@@ -7,7 +7,6 @@
 #pragma once
 
 #include <algorithm>
-#include <chrono>
 #include <concepts>
 #include <cstddef>
 #include <optional>
@@ -18,6 +17,7 @@
 
 #include "estimator/soc_estimator.hpp"
 #include "model/extended.hpp"
+#include "replay/processor_time.hpp"
 #include "replay/replay.hpp"
 
 namespace bms::replay {
@@ -56,7 +56,7 @@ template <class Estimator, class Cell>
   step_through<Estimator>(cell, samples, continued, estimates);
 }
 
-/// Runs once and calls take(estimates, count) for each block. Returns the seconds of the estimator alone.
+/// Runs once and calls take(estimates, count) for each block. Returns the processor time of the estimator alone [s].
 template <class Estimator, class Cell, class Take>
 double run_once(const Cell& cell, const measurement::SampleList& samples,
                 const std::optional<measurement::StartingPoint>& start, Take&& take) {
@@ -66,12 +66,12 @@ double run_once(const Cell& cell, const measurement::SampleList& samples,
   double seconds = 0;
   for (std::size_t first = 0; first < samples.size(); first += block_rows) {
     const std::span<const measurement::Sample> block = samples.part(first, block_rows, space);
-    const auto begin = std::chrono::steady_clock::now();
+    const double begin_s = processor_time_s();
     if constexpr (Estimator::extra_values == 0)
       step_through_flat<Estimator>(cell, block, estimator, estimates);
     else
       step_through<Estimator>(cell, block, estimator, estimates);
-    seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    seconds += processor_time_s() - begin_s;
     take(estimates, block.size());
   }
   return seconds;

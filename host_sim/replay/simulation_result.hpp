@@ -15,7 +15,7 @@ struct SimulationResult {
   std::string read_as;     ///< of the input
   std::size_t samples = 0;
   double duration_s = 0, initial_soc = 0, final_soc = 0, final_voltage_v = 0;
-  double steps_per_second = 0;
+  double steps_per_second = 0;  ///< of processor time
   std::vector<measurement::Warning> warnings;
 };
 

@@ -1,7 +1,6 @@
 // bms simulate: the model's voltage for the current of a recording or a profile, open loop.
 #include <algorithm>
 #include <charconv>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -14,6 +13,7 @@
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
 #include "replay/gaussian_noise.hpp"
+#include "replay/processor_time.hpp"
 #include "replay/simulation.hpp"
 #include "replay/simulation_result.hpp"
 #include "reports/json_cell.hpp"
@@ -153,7 +153,7 @@ void check_range(const SimulateOptions& options, const SimulationRun& run) {
 
 void compute(const SimulateOptions& options, SimulationRun& run) {
   const auto cell = model::prepare<double, model::max_intervals>(run.cell.parameters);
-  const auto begin = std::chrono::steady_clock::now();
+  const double begin_s = replay::processor_time_s();
   run.rows = replay::simulate({.cell = cell,
                                .capacity_ah = run.cell.parameters.capacity_ah,
                                .mechanisms = run.cell.mechanisms,
@@ -161,7 +161,7 @@ void compute(const SimulateOptions& options, SimulationRun& run) {
                                .current_a = run.recording.current_a,
                                .temperature_c = run.recording.temperature_c,
                                .initial_soc = options.initial_soc});
-  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  const double seconds = replay::processor_time_s() - begin_s;
   check_range(options, run);
   run.cells = simulate_cells(run.cell, run.recording);
   run.result = {.cell = run.cell.name,

@@ -105,6 +105,28 @@ TEST(UdCovariance, AgreesWithADenseJosephFilterWhereTheLastStateDecays) {
 TEST(UdCovariance, AgreesInFloatToItsDigits) { expect_agreement<float, 2>(1e-4, 2'000); }
 TEST(UdCovariance, AgreesInFixedPointToItsDigits) { expect_agreement<arithmetic::FixedPoint, 3>(1e-4, 2'000); }
 
+/// States that nothing corrects for hours: their couplings would decay to subnormal numbers.
+TEST(UdCovariance, CouplingsThatHaveDecayedAreNoneAndNoVarianceNoticesIt) {
+  UdCovariance<float, 3> ud;
+  tests::EigenCovariance<double, 3> reference;
+  ud.set_diagonal({1e-4F, 1e-4F, 1e-2F});
+  reference.set_diagonal({1e-4, 1e-4, 1e-2});
+  ud.observe({1, 1, 0.25F}, 1e-6F, 0);
+  reference.observe({1, 1, 0.25}, 1e-6, 0);
+  const auto coupling = [&] { return ud.dense()[0][2]; };
+  ASSERT_LT(coupling(), -1e-5);
+  for (int k = 0; k < 400; ++k) {
+    ud.propagate({{{0.875F, 0, 0}, {0, 0.9375F, 0}, {0, 0, 1}}}, {1e-10F, 1e-10F, 1e-10F});
+    reference.propagate({{{0.875, 0, 0}, {0, 0.9375, 0}, {0, 0, 1}}}, {1e-10, 1e-10, 1e-10});
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double expected = reference.dense()(static_cast<int>(i), static_cast<int>(i));
+      ASSERT_NEAR(ud.dense()[i][i], expected, 1e-4 * expected) << i << " in step " << k;
+    }
+    if (k == 50) ASSERT_NE(coupling(), 0);
+  }
+  EXPECT_EQ(coupling(), 0);
+}
+
 TEST(UdCovariance, StaysPositiveWhereTheOrdinaryFormOfAFloatFilterDoesNot) {
   // a nearly noiseless measurement of one combination of two states, again and again: the classic way to lose a
   // covariance
