@@ -31,6 +31,8 @@ sees = ["model"]
 purpose = "Finds causes."
 sees = ["host_sim/files"]
 never = []
+[room.tests]
+purpose = "Tests."
 """
 CLEAN = {
     "checks/rooms.toml": ROOMS,
@@ -40,6 +42,8 @@ CLEAN = {
     "inference/diagnosis/thresholds.hpp": "#pragma once\nconstexpr double least_gain = 0.03;\n",
     DIAGNOSE: '#include "files/cell_file.hpp"\n\ndouble half(double x) { return 0.5 * x; }\n',
     "README.md": "The residual is not significant.\n",
+    "tests/long.txt": "# Long.\nCell.IsRight 20 slow\n",
+    "tests/cell_test.cpp": "TEST(Cell, IsRight) {}\n",
 }
 SAFETY_CLEAN = {
     "firmware/protection/faults.hpp": "enum class Fault { hot, cold };  // not: warm\n",
@@ -122,6 +126,7 @@ BREACHES = [  # check, file, what is added to it, what the check must say
     ("words", "model/cell.hpp", "// A value of 15,\n// which is none.\n", "model/cell.hpp:4: is none ->"),
     ("words", "model/cell.hpp", "void know_anew(int state);\n", "model/cell.hpp:3: know_anew ->"),
     ("words", DIAGNOSE, 'auto text = "a fault beside it";\n', "diagnose.cpp:4: beside ->"),
+    ("long_tests", "tests/long.txt", "Cell.IsWrong 20 slow\n", "tests/long.txt:3: no test is called Cell.IsWrong"),
     ("words", "README.md", "For who builds a truck.\n", "README.md:2: For who ->"),
     ("format", DIAGNOSE, "int  badly( int x ){return x ;}\n", "diagnose.cpp:4:"),
     ("format", "host_sim/reports/page/new.js", "const x = {a:1};\n", "host_sim/reports/page/new.js:1:"),
@@ -141,7 +146,7 @@ def outcome(check, root):
 
 def faults_of(root):
     """Yields a message for each check that does not behave."""
-    checks = ["arrows", "literals", "lengths", "statements", "words", "format"]
+    checks = ["arrows", "literals", "lengths", "statements", "words", "format", "long_tests"]
     for path, text in CLEAN.items():
         write(root, path, text)
     for check in checks:
