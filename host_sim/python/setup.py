@@ -10,7 +10,7 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 HERE = pathlib.Path(__file__).resolve().parent
-ROOT = HERE.parent
+ROOT = HERE.parents[1]
 VERSION = re.search(r"project\(greybox_bms VERSION ([0-9.]+)", (ROOT / "CMakeLists.txt").read_text())[1]
 
 

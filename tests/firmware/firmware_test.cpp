@@ -181,7 +181,7 @@ TEST(SlcanBoard, ReportsItsCellFile) {
   std::memcpy(&in_the_image, file.at(file.symbol("image_cell_hash"), sizeof in_the_image).data(), sizeof in_the_image);
   EXPECT_EQ(in_the_image, cell.hash);
   EXPECT_EQ(fmt::format("{:08x}", in_the_image), files::sha256(cell.text).substr(0, 8));
-  EXPECT_EQ(identity.substr(17), "0100");  // 0.1.0, minor before major
+  EXPECT_EQ(identity.substr(17), "0200");  // 0.2.0, minor before major
   EXPECT_EQ(identity[7], '0') << "patch";
 }
 

@@ -79,7 +79,7 @@ TEST_F(Package, IsFoundAfterAnInstallation) {
 TEST_F(Package, AnotherVersionIsRefused) {
   const std::string prefix = (folder_.path() / "installed").string();
   run("cmake --install " BMS_BUILD_DIR " --component library --prefix " + prefix);
-  run("sed -i 's/greybox 0.1/greybox 0.2/' " + (consumer_ / "CMakeLists.txt").string());
+  run("sed -i 's/greybox 0.2/greybox 0.3/' " + (consumer_ / "CMakeLists.txt").string());
   run("! cmake -G Ninja -S " + consumer_.string() + " -B " + build_.string() +
       " -DGREYBOX_BY=find -DCMAKE_PREFIX_PATH=" + prefix);
   EXPECT_THAT(content(folder_.path() / "out"), HasSubstr("compatible with requested version"));

@@ -225,9 +225,9 @@ way_python() {
   fresh python
   packages /opt/greybox-bms.deb pybind11-dev python3-dev python3-numpy python3-setuptools python3-wheel python3-pip \
     "$(packages_of host | tr '\n' ' ')"
-  step "pip install" <<<'cd python && pip install --no-build-isolation --no-index --break-system-packages .'
+  step "pip install" <<<'cd host_sim/python && pip install --no-build-isolation --no-index --break-system-packages .'
   step "tests of the module" <<<'cd / && BMS_TOOL=/usr/bin/bms BMS_SOURCE_DIR=/opt/project \
-    python3 /opt/project/tests/python/module_test.py'
+    python3 /opt/project/tests/host_sim/python/module_test.py'
 }
 
 make_base
