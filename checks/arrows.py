@@ -140,7 +140,7 @@ def drawing(rooms, roots):
     drawn = sorted(room for room in arrows if room != "tests" and (arrows[room] or room in seen_by_others))
     rows = [("floor", "on the controller", "only on the host")]
     for number in range(max(floor[room] for room in drawn), -1, -1):
-        here = [room for room in drawn if floor[room] == number]
+        here = sorted((room for room in drawn if floor[room] == number), key=lambda room: shown(room, roots))
         sides = ["  ".join(shown(r, roots) for r in here if rooms[r].get("controller", False) is side)
                  for side in (True, False)]
         rows.append((str(number), *sides))
