@@ -4,7 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <fstream>
 #include <functional>
+#include <string>
 
 #include "files/text_file.hpp"
 #include "tests/host_sim/files/rejected_input.hpp"
@@ -266,6 +268,34 @@ TEST(CellFile, AMechanismWithStatesAndWithoutStrengthIsNotComputed) {
   }
   const CellFile cell = parse_cell(base + "\n[mechanism.ocv_hysteresis]\nhalf_gap_v = 0.001\n", "c.toml");
   EXPECT_EQ(on_board(cell.mechanisms).size(), 1U);
+}
+
+/// Keys of cell files are a public interface. The files are those that 0.1.0 was shipped with.
+TEST(CellFile, FilesOfVersion010AreReadWithEveryValue) {
+  for (const std::string name : {"a123_26650_extended", "a123_esctoolbox_extended"}) {
+    const std::string path = BMS_SOURCE_DIR "/tests/host_sim/files/version_0_1_0/" + name + ".toml";
+    const CellFile cell = read_cell(path);
+    EXPECT_EQ(cell.name, name);
+    std::ifstream in(path);
+    std::string table, line;
+    std::size_t values = 0;
+    while (std::getline(in, line)) {
+      if (line.starts_with("[")) table = line.substr(1, line.find(']') - 1);
+      const std::size_t equals = line.find(" = ");
+      if (!table.starts_with("mechanism.") || equals == std::string::npos || line.starts_with("source")) continue;
+      const std::string key = line.substr(0, equals);
+      const model::MechanismSetting& m = setting_of(cell, table.substr(std::string("mechanism.").size()));
+      const model::MechanismInfo& info = model::catalogue[m.index];
+      std::size_t k = 0;
+      while (k < info.parameters && key != info.parameter[k].name) ++k;
+      ASSERT_LT(k, info.parameters) << table << " " << key;
+      EXPECT_EQ(m.value[k], std::stod(line.substr(equals + 3))) << table << " " << key;
+      ++values;
+    }
+    EXPECT_GE(values, 9U);
+    EXPECT_TRUE(cell.parameters.noise.errors_are_states);
+    EXPECT_EQ(cell.parameters.ocv.half_gap_v.size, cell.parameters.ocv.soc.size);
+  }
 }
 
 TEST(CellFile, EveryMechanismIsWrittenAndReadBackBitForBit) {
