@@ -41,7 +41,7 @@ class Consistency {
     return (static_cast<std::uint32_t>(before_us) ^ static_cast<std::uint32_t>(now_us)) >> turn_bits != 0;
   }
   /// The next sample is checked. Not inline: a conditional store would be counted in every step.
-  [[gnu::noinline]] constexpr void ask() { unchecked_below_v_ = Voltage(-1); }
+  [[gnu::noinline]] constexpr void force_check() { unchecked_below_v_ = Voltage(-1); }
   /// Whether a sample is to be checked: one that was asked for, the first one, and a suspect innovation, which may not
   /// be a number.
   constexpr bool is_due(const Voltage& innovation_v) const {
@@ -84,7 +84,7 @@ class Consistency {
   }
   /// The deviation so far is explained; the next sample is checked.
   constexpr void reset() {
-    ask();
+    force_check();
     mean_v_ = Voltage(0);
     expected_v2_ = Variance{};
   }

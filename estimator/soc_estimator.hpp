@@ -67,7 +67,7 @@ class SocEstimator {
 
     const std::uint64_t step_us = sample.time_us - time_us_;
     if (Consistency<S>::turn_ends(time_us_, sample.time_us)) [[unlikely]]
-      monitor_.ask();
+      monitor_.force_check();
     time_us_ = sample.time_us;
     std::uint32_t flags = 0;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
@@ -244,7 +244,7 @@ class SocEstimator {
                                                           Temperature temperature_c, Soc soc, Voltage above_ocv_v,
                                                           Voltage innovation_v, bool measured) {
     monitor_.watch(cell, constants_, state_, time_us_, current_a, above_ocv_v, innovation_v, measured);
-    if (!monitor_.has_to_judge(soc, innovation_v)) return 0;
+    if (!monitor_.needs_check(soc, innovation_v)) return 0;
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
     const std::uint32_t found =
         monitor_.judge(cell, input, constants_, soc, innovation_v,

@@ -36,7 +36,7 @@ class SocMonitor {
  public:
   /// Variance of the model's error in the bank after a contradiction, in addition to the expected one: the model may be
   /// three times as wrong as its file says.
-  static constexpr double model_may_be_off = 8;
+  static constexpr double model_error_factor = 8;
   /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
   static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
 
@@ -51,7 +51,7 @@ class SocMonitor {
   constexpr bool bank_is_open() const { return bank_.open(); }
 
   /// The next sample is checked.
-  constexpr void ask() { consistency_.ask(); }
+  constexpr void force_check() { consistency_.force_check(); }
   constexpr bool is_due(const Voltage& innovation_v) const { return consistency_.is_due(innovation_v); }
   /// Variance of a reading: its own noise, and the error of the overpotential of the last half hour.
   constexpr const Variance& reading_noise_v2() const { return reading_noise_v2_; }
@@ -75,7 +75,7 @@ class SocMonitor {
                                          arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
   }
 
-  constexpr bool has_to_judge(const Soc& soc, const Voltage& innovation_v) const {
+  constexpr bool needs_check(const Soc& soc, const Voltage& innovation_v) const {
     return bank_.open() || is_suspect(soc, innovation_v);
   }
   /// Variance of the present overpotential, and of what that of the last half hour left.
@@ -153,7 +153,7 @@ class SocMonitor {
     const SocDistribution<S> before{soc, wider < least ? least : wider};
     contradicted_ = true;
     state.covariance.template reset<Model::soc>(before.variance);
-    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_may_be_off)),
+    const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_error_factor)),
                    seen_v2 = consistency_.variance();
     bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();

@@ -151,7 +151,7 @@ void run(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app{"Run the diagnosis and simpler rules on concealed cases and score their answers"};
   app.name("benchmark");
-  app.footer("Example: benchmark development 1 --readme evidence/benchmark/README.md");
+  app.footer("Example: benchmark development 1 --readme docs/figures/benchmark.md");
   Options o;
   app.add_option("split", o.split, "development: cases for development; final: cases that are run once")
       ->required()

@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "diagnosis/courses_among.hpp"
+#include "diagnosis/experiments_already_done.hpp"
 #include "diagnosis/next_experiment.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "diagnosis/reference.hpp"
@@ -215,7 +215,7 @@ void add_next_experiment(const DiagnoseOptions& options, DiagnoseResult& r) {
   const bool temperature = std::any_of(r.recordings.begin(), r.recordings.end(),
                                        [](const RecordingComparison& c) { return !c.record.temperature_c.empty(); });
   r.next = diagnosis::next_experiment(r.cell.parameters, r.diagnosis, temperature,
-                                      diagnosis::courses_among(records, r.cell.parameters.capacity_ah));
+                                      diagnosis::experiments_already_done(records, r.cell.parameters.capacity_ah));
   if (r.next) {
     r.then = joint_command(options, r.recordings, *r.next);
     return;

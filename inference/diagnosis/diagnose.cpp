@@ -185,14 +185,14 @@ void withhold_only_place(LikelihoodModel& likelihood, const NoiseModel& nominal,
 }
 
 /// Where an unknown cause sits, and the cell with a term for it. One or two causes that are named although a law that
-/// no mechanism changes explains more are unknown. A file that lacks three is plain: whatever it lacks looks foreign as
-/// well. With healthy recordings the catalogue is judged by them.
+/// no mechanism changes explains more are unknown; a cell file missing three or more effects produces residuals outside
+/// the catalogue anyway. With healthy recordings the catalogue is judged by them.
 void add_law_term(const LikelihoodModel& likelihood, const NoiseModel& nominal, bool healthy, Diagnosis& d) {
-  const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.law.doubted;
+  const bool doubtful = names(d.verdict) && !healthy && d.findings.size() <= law_thresholds.law.few_causes;
   if ((d.verdict != Verdict::unknown && !doubtful) || d.interrupted) return;
   std::vector<LawEvidence> laws = law_evidence(likelihood, nominal);
   if (doubtful) {
-    if (!is_doubted(laws, d.base_cost - d.best_cost, d.remaining)) return;
+    if (!another_law_explains_more(laws, d.base_cost - d.best_cost, d.remaining)) return;
     d.verdict = Verdict::unknown;
   }
   d.law = learn_law_term(likelihood, nominal, std::move(laws));
@@ -255,7 +255,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   if (!judge_healthy && !options.learns) {
     withhold_only_place(likelihood, search.nominal_noise(), control, options.false_alarm_rate, survivors, adequacy,
                         d.withheld);
-    if (is_read_in_leaps(likelihood.records())) adequacy.unknown = true;  // which no cause makes
+    if (is_read_in_leaps(likelihood.records())) adequacy.unknown = true;  // no mechanism in the catalogue produces this
   }
   d.limits = stated_limits(likelihood, search.nominal_noise(), control, sigmas, adequacy, judge_healthy);
   if (!options.learns && !search.stopped())

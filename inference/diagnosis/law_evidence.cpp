@@ -26,14 +26,14 @@ constexpr const LeapThresholds& leap_limits = law_thresholds.leaps;
 struct LawForm {
   const char *law, *depends_on;
   Eigen::Index first, count;
-  bool foreign = false;  ///< no mechanism of the catalogue has it
+  bool outside_catalogue = false;  ///< no mechanism of the catalogue has it
 };
 
 /// Of a family of generic columns. What depends on the charge and the direction is hysteresis: a law of the OCV.
 struct FamilyForm {
   std::string_view family;
   const char *law, *depends_on;
-  bool foreign = false;
+  bool outside_catalogue = false;
 };
 constexpr std::array<FamilyForm, 7> family_forms = {{
     {"the state of charge and the direction", "ocv", "soc"},
@@ -171,11 +171,12 @@ double evidence_of(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward) {
   return best;
 }
 
-void add_evidence(std::vector<LawEvidence>& found, const char* law, const char* depends_on, double gain, bool foreign) {
+void add_evidence(std::vector<LawEvidence>& found, const char* law, const char* depends_on, double gain,
+                  bool outside_catalogue) {
   auto same =
       std::find_if(found.begin(), found.end(), [&](const LawEvidence& e) { return std::string_view(e.law) == law; });
   if (same == found.end()) same = found.insert(found.end(), {law, depends_on, 0, 0});
-  if (foreign) same->foreign = std::max(same->foreign, gain);
+  if (outside_catalogue) same->outside_catalogue = std::max(same->outside_catalogue, gain);
   if (gain <= same->gain) return;
   same->depends_on = depends_on;
   same->gain = gain;
@@ -204,10 +205,10 @@ double evidence_of_a_wave(const LikelihoodModel& likelihood, const ResidualProje
 
 }  // namespace
 
-bool is_doubted(const std::vector<LawEvidence>& laws, double gain, double remaining) {
-  double foreign = 0;
-  for (const LawEvidence& e : laws) foreign = std::max(foreign, e.foreign);
-  return remaining > 0 && foreign > gain - remaining - thresholds.decision.tie;
+bool another_law_explains_more(const std::vector<LawEvidence>& laws, double gain, double remaining) {
+  double outside_catalogue = 0;
+  for (const LawEvidence& e : laws) outside_catalogue = std::max(outside_catalogue, e.outside_catalogue);
+  return remaining > 0 && outside_catalogue > gain - remaining - thresholds.decision.tie;
 }
 
 bool follows_in_leaps(const PreparedRecording& r) {
@@ -250,14 +251,15 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const H
     if (form == family_forms.end()) continue;
     add_evidence(found, form->law, form->depends_on,
                  evidence_of(of_generic.gram(f.first, f.count), of_generic.toward().segment(f.first, f.count)),
-                 form->foreign);
+                 form->outside_catalogue);
   }
   Columns more = law_columns(likelihood, fit);
   likelihood.whiten(more);
   const ResidualProjection::Products of_more = projection.of(more);
   for (const LawForm& f : extra_forms)
     add_evidence(found, f.law, f.depends_on,
-                 evidence_of(of_more.gram(f.first, f.count), of_more.toward().segment(f.first, f.count)), f.foreign);
+                 evidence_of(of_more.gram(f.first, f.count), of_more.toward().segment(f.first, f.count)),
+                 f.outside_catalogue);
   add_evidence(found, "voltage", "time", evidence_of_a_wave(likelihood, projection), true);
   std::sort(found.begin(), found.end(), [](const LawEvidence& a, const LawEvidence& b) { return a.gain > b.gain; });
   return found;

@@ -16,10 +16,10 @@
 namespace bms::diagnosis {
 
 struct LawEvidence {
-  const char* law;         ///< as LawTerm::law; "": a function of the time, which every law is
-  const char* depends_on;  ///< soc, current, time, temperature, voltage
-  double gain = 0;         ///< the evidence
-  double foreign = 0;      ///< gain of the best form that no mechanism of the catalogue has
+  const char* law;               ///< as LawTerm::law; "": a function of the time, which every law is
+  const char* depends_on;        ///< soc, current, time, temperature, voltage
+  double gain = 0;               ///< the evidence
+  double outside_catalogue = 0;  ///< gain of the best form that no mechanism of the catalogue has
 };
 
 /// The largest first; the best form of each law.
@@ -28,7 +28,7 @@ std::vector<LawEvidence> law_evidence(const LikelihoodModel& likelihood, const H
 /// Returns true if a law that no mechanism changes explains more than the causes that are named, or less by no more
 /// than a tie. gain: of the causes. remaining: what they leave, which counts against them; where it is nothing, no law
 /// can be missing.
-bool is_doubted(const std::vector<LawEvidence>& laws, double gain, double remaining);
+bool another_law_explains_more(const std::vector<LawEvidence>& laws, double gain, double remaining);
 
 /// Returns true if the voltage's reading often stands still, and never moves by less than several of the steps that it
 /// can resolve: it stands until the voltage has left it by a threshold.

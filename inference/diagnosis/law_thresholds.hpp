@@ -20,9 +20,9 @@ struct TermThresholds {
 
 /// The evidence of a law (law_evidence.hpp).
 struct EvidenceThresholds {
-  double least = 20;        ///< of a law: healthy recordings have less
-  std::size_t doubted = 2;  ///< so many causes, named without healthy recordings, are doubted: a file that lacks more
-                            ///< is plain, and whatever it lacks looks foreign as well
+  double least = 20;           ///< of a law: healthy recordings have less
+  std::size_t few_causes = 2;  ///< named without healthy recordings, at most so many are doubted: a cell file missing
+                               ///< three or more effects produces residuals outside the catalogue
   double narrowest = 1.0 / 64, widest = 4;  ///< prior of a law's columns, times the free error
   /// [s] time constants of the load before; a memory of the load is fitted from the slow ones.
   std::array<double, 3> fast_s = {4, 15, 60}, slow_s = {250, 1'000, 4'000};

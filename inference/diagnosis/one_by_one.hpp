@@ -1,5 +1,5 @@
 // Several recordings together can be harder to explain than each of them: contacts differ from one to the next, a cell
-// ages. What one of them shows by itself is not lost because others were given as well.
+// ages. A cause visible in one recording must not be lost by adding others.
 #pragma once
 
 #include <functional>

@@ -29,7 +29,7 @@ bool under_one_current(const PreparedRecording& r, const model::Span& span) {
 }
 
 /// Returns true if a loose contact is seen to go and to come back.
-bool goes_and_comes(const LikelihoodModel& likelihood, const Hypothesis& h) {
+bool has_recovering_burst(const LikelihoodModel& likelihood, const Hypothesis& h) {
   if (h.find(Signature::contact_bursts) == nullptr) return false;
   for (std::size_t r = 0; r < h.bursts.size(); ++r) {
     const PreparedRecording& record = likelihood.records()[r];
@@ -43,7 +43,7 @@ bool goes_and_comes(const LikelihoodModel& likelihood, const Hypothesis& h) {
 }  // namespace
 
 std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const Eigen::VectorXd& before,
-                                      const Eigen::VectorXd& after, double bent) {
+                                      const Eigen::VectorXd& after, double calibration_relief) {
   double total = 0, most = 0;
   PlaceOfGain place;
   Eigen::Index start = 0;
@@ -60,16 +60,16 @@ std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const E
     start += static_cast<Eigen::Index>(rows);
   }
   if (most <= thresholds.decision.in_one_place * total) return std::nullopt;
-  if ((1 - most / total) * (total + bent) >= thresholds.decision.detected) return std::nullopt;
+  if ((1 - most / total) * (total + calibration_relief) >= thresholds.decision.detected) return std::nullopt;
   return place;
 }
 
 std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
                                       const HypothesisFit& fit) {
   // base parameters that need not bend any more have no place: their part goes with what is explained where
-  const double bent = std::max(control.calibration.squaredNorm() - fit.calibration.squaredNorm(), 0.0);
-  const std::optional<PlaceOfGain> place = only_place(likelihood, control.residual, fit.residual, bent);
-  if (place && goes_and_comes(likelihood, fit.hypothesis)) return std::nullopt;
+  const double calibration_relief = std::max(control.calibration.squaredNorm() - fit.calibration.squaredNorm(), 0.0);
+  const std::optional<PlaceOfGain> place = only_place(likelihood, control.residual, fit.residual, calibration_relief);
+  if (place && has_recovering_burst(likelihood, fit.hypothesis)) return std::nullopt;
   return place;
 }
 

@@ -26,10 +26,10 @@ struct PlaceOfGain {
 std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const HypothesisFit& control,
                                       const HypothesisFit& fit);
 
-/// The same of a whitened residual without and with columns that could follow anything. bent: squares of base
-/// parameters that need not bend any more.
+/// The same of a whitened residual without and with columns that could follow anything. calibration_relief: reduction
+/// of the calibration penalty.
 std::optional<PlaceOfGain> only_place(const LikelihoodModel& likelihood, const Eigen::VectorXd& before,
-                                      const Eigen::VectorXd& after, double bent);
+                                      const Eigen::VectorXd& after, double calibration_relief);
 
 /// What a hypothesis adds, not to be named because of its only place. gains: by mechanism.
 std::vector<Withheld> withheld_at(const LikelihoodModel& likelihood, const PlaceOfGain& place, const Hypothesis& h,

@@ -1,5 +1,6 @@
-// A second look at a fit from some distance. Where the OCV has corners a fit can end at one of them, sure of itself:
-// the derivatives there say that every step makes it worse, while the profile of the likelihood falls further on.
+// A second look at a fit from some distance. Where the OCV has corners a fit can stop at one of them with too small a
+// covariance: the derivatives there say that every step makes it worse, while the profile of the likelihood falls
+// further on.
 #pragma once
 
 #include <array>

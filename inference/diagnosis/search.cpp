@@ -252,8 +252,7 @@ HypothesisFit Search::refined_onset(HypothesisFit best) const {
 }
 
 std::vector<HypothesisFit> Search::one_more(const HypothesisFit& around, const std::vector<std::size_t>& over) {
-  // with the nominal noise, which asks for everything to be explained, and with that of the current residual, which
-  // asks for the large effects first
+  // the nominal noise makes every feature significant; that of the current residual, the large effects alone
   std::vector<HypothesisFit> fits;
   std::set<std::size_t> tried;
   for (const NoiseModel& noise : {nominal_, around.noise}) {
@@ -347,7 +346,7 @@ std::vector<HypothesisFit> Search::fitted(const HypothesisFit& around, const std
   return fits;
 }
 
-bool Search::carries(const HypothesisFit& before, const HypothesisFit& f) const {
+bool Search::improves_lasting_error(const HypothesisFit& before, const HypothesisFit& f) const {
   if (f.hypothesis.added().size() < 2) return true;
   const double was_v = std::min(lasting_error_v(likelihood_, before), plain_error_v(likelihood_, likelihood_.base()));
   return lasting_error_v(likelihood_, f) <= search_limits.error_may_grow * was_v + search_limits.error_may_grow_v;

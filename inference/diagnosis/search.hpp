@@ -72,7 +72,7 @@ class Search {
   /// Returns true if a cell file with it would do as well as with what was there. What helps only together with the
   /// start and the sensor's wander in this recording is not a cause. A first mechanism always passes: of two that hide
   /// each other, one alone makes the error larger.
-  bool carries(const HypothesisFit& before, const HypothesisFit& f) const;
+  bool improves_lasting_error(const HypothesisFit& before, const HypothesisFit& f) const;
 
   /// The rest of a fit without a mechanism, fitted again from where it was.
   HypothesisFit without_one(const HypothesisFit& f, std::size_t mechanism);

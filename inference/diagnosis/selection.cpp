@@ -18,7 +18,7 @@ namespace {
 
 constexpr const Thresholds::Decision& selection_limits = thresholds.decision;
 
-bool comes_and_goes(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
+bool is_intermittent(std::size_t mechanism) { return knowledge_of(mechanism).signature == Signature::contact_bursts; }
 
 /// Largest factor by which the variance of one of a mechanism's strengths is wider with the error of the model.
 double widening(const Hypothesis& narrow, const Hypothesis& wide, std::size_t mechanism) {
@@ -88,7 +88,7 @@ class Elimination {
       if (found_.gains[m] < 0 && begins_better(m, without[m])) return true;
     }
     const std::size_t needless =
-        least_of_those_that_go(found_.best.hypothesis.added(), [&](std::size_t m) -> std::optional<CertainAndGain> {
+        weakest_removable(found_.best.hypothesis.added(), [&](std::size_t m) -> std::optional<CertainAndGain> {
           const double gain = found_.gains[m];
           const bool needed =
               gain >= selection_limits.detected && is_credible(found_.best, m) &&
@@ -151,7 +151,7 @@ class Elimination {
     });
   }
 
-  /// What is certain before any voltage is looked at may be known badly: then its standard deviation says so.
+  /// A mechanism known a priori may still have a poorly determined size: then its standard deviation says so.
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
     return scope_.expected.contains(m) ||
            (!is_weak(f, m, scope_.expected) && !is_implausible(f, m, likelihood_.facts()) &&
@@ -169,7 +169,7 @@ class Elimination {
   bool drop_one_not_credible() {
     const std::vector<std::size_t> added = found_.best.hypothesis.added();
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
-    const std::size_t worst = least_of_those_that_go(added, [&](std::size_t m) -> std::optional<double> {
+    const std::size_t worst = weakest_removable(added, [&](std::size_t m) -> std::optional<double> {
       const bool too_large = added.size() > 1 && is_too_large(m, rms_v.at(m));
       if (!too_large && is_credible(found_.best, m)) return std::nullopt;
       return -rms_v.at(m);
@@ -202,18 +202,18 @@ class Elimination {
   }
 
   /// Returns true for a contact, or what is not distinguished from one at one current.
-  static bool may_be_contact(std::size_t m) {
+  static bool could_be_contact(std::size_t m) {
     return m == model::mechanism_index_of<model::ContactStep> ||
            m == model::mechanism_index_of<model::ResistanceGrowth>;
   }
 
   /// Returns true if what a slow cause explains next to a contact, at one current, is no more than it may wander.
   bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
-    if (!one_current_ || scope_.expected.contains(m) || may_be_contact(m) || comes_and_goes(m) ||
+    if (!one_current_ || scope_.expected.contains(m) || could_be_contact(m) || is_intermittent(m) ||
         model::catalogue[m].domain != model::Domain::physics)
       return false;
     double resistance_v = 0;
-    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, may_be_contact(other) ? v : 0);
+    for (const auto& [other, v] : rms_v) resistance_v = std::max(resistance_v, could_be_contact(other) ? v : 0);
     return fitted_error_v(likelihood_, without) <
            std::hypot(fitted_error_v(likelihood_, found_.best), selection_limits.contact_wander * resistance_v);
   }
@@ -252,7 +252,7 @@ class Elimination {
     const Search::Replacement replacement{m, best, without, found_.gains[m]};
     for (HypothesisFit& rival : search_.in_place_of(replacement, scope_.searched, likeness)) {
       const bool same_mechanisms = rival.hypothesis.find(m) != nullptr;
-      if (!search_.carries(without, rival)) continue;
+      if (!search_.improves_lasting_error(without, rival)) continue;
       const double ahead = same_mechanisms ? selection_limits.better_start : selection_limits.better_rival;
       const std::vector<std::size_t> added = rival.hypothesis.added();
       const bool replaceable =
@@ -309,12 +309,12 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
     if (gain > selection_limits.detected) current = fits.front();
   }
   std::vector<std::size_t> steady = scope.searched;
-  std::erase_if(steady, comes_and_goes);
+  std::erase_if(steady, is_intermittent);
   bool all = false;
   while (current.hypothesis.added().size() < most && !search.stopped()) {
     std::vector<HypothesisFit> fits = search.one_more(current, all ? scope.searched : steady);
     if (current.hypothesis.added().empty()) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
-    std::erase_if(fits, [&](const HypothesisFit& f) { return !search.carries(current, f); });
+    std::erase_if(fits, [&](const HypothesisFit& f) { return !search.improves_lasting_error(current, f); });
     for (const HypothesisFit& f : fits) {
       double& gain = grown.gains[f.hypothesis.settings.back().index];
       gain = std::max(gain, search.gain(current, f));
@@ -358,7 +358,7 @@ Survivors without_uncertain(Search& search, LikelihoodModel& likelihood, const H
     HypothesisFit with_error = found.best;
     include_model_error(likelihood, with_error);
     const std::size_t weakest =
-        least_of_those_that_go(with_error.hypothesis.added(), [&](std::size_t m) -> std::optional<double> {
+        weakest_removable(with_error.hypothesis.added(), [&](std::size_t m) -> std::optional<double> {
           if (scope.expected.contains(m) || !is_uncertain(with_error, m, scope.expected)) return std::nullopt;
           // far from an ellipse the deviations say less than the gain, which the error of the model makes too large
           const double too_large = widening(found.best.hypothesis, with_error.hypothesis, m);

@@ -45,10 +45,10 @@ struct Survivors {
 Survivors eliminate(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                     const HypothesisFit& grown, const Scope& scope);
 
-/// Of mechanisms that may not stay, the one with the least weight, the first of equals; no_mechanism if all may stay.
-/// weight(mechanism): nothing if it may stay.
+/// Weakest mechanism to remove, the first if several are equally weak; no_mechanism if none is removable.
+/// weight(mechanism): nothing if it is not removable.
 template <class Weight>
-std::size_t least_of_those_that_go(const std::vector<std::size_t>& mechanisms, Weight&& weight) {
+std::size_t weakest_removable(const std::vector<std::size_t>& mechanisms, Weight&& weight) {
   decltype(weight(no_mechanism)) least;
   std::size_t goes = no_mechanism;
   for (const std::size_t m : mechanisms) {

@@ -286,10 +286,9 @@ std::string because(const Diagnosis& d, const Finding& f, const RecordingFacts& 
     explained = r.explained_share;
   }
   return fmt::format(
-      "{} The data support the first: it fits better by {:.0f} ({:.0f} or less is a tie). It explains {} of the "
-      "mismatch, "
-      "the other {}.",
-      compared(instead), best - rival->gain, thresholds.decision.tie, percent(explained),
+      "{} The data support the first: its log posterior is larger by {:.1f} (up to {:.1f}: undecided). It explains {} "
+      "of the mismatch, the other {}.",
+      compared(instead), (best - rival->gain) / 2, thresholds.decision.tie / 2, percent(explained),
       percent(rival->explained_share));
 }
 

@@ -237,14 +237,14 @@ struct Thresholds {
                                        ///< so much less capacity: no electrode is used less otherwise
     double slides_apart_soc = 0.6;     ///< between the two slides of an OCV
     double trades = 0.8;               ///< correlation of two strengths of which the recordings know the sum alone
-    double in_one_place = 0.5;       ///< share of what a cause gains from the readings above which it has one place, a
-                                     ///< twelfth of a recording, if the rest gains less than `detected`. Most of it:
-                                     ///< not tuned. Without healthy data 29 of 68 healthy discharges of NASA cells
-                                     ///< had a cause, with it 4; of 49 with effects it costs 1 (development split)
-    double cause_explains = 0.1;     ///< share of the squared error, where it acts, that a cause explains at least
-    double gross_v = 0.1;            ///< [V] RMS error of the cell file that no tolerance makes a healthy one
-    double error_may_grow = 1.15;    ///< of the error without the start's and the sensor's own unknowns, by adding
-                                     ///< a cause,
+    double in_one_place = 0.5;     ///< share of what a cause gains from the readings above which it has one place, a
+                                   ///< twelfth of a recording, if the rest gains less than `detected`. Most of it:
+                                   ///< not tuned. Without healthy data 29 of 68 healthy discharges of NASA cells
+                                   ///< had a cause, with it 4; of 49 with effects it costs 1 (development split)
+    double cause_explains = 0.1;   ///< share of the squared error, where it acts, that a cause explains at least
+    double gross_v = 0.1;          ///< [V] RMS error above which a cell is never called healthy, whatever the tolerance
+    double error_may_grow = 1.15;  ///< of the error without the start's and the sensor's own unknowns, by adding
+                                   ///< a cause,
     double error_may_grow_v = 3e-4;  ///< [V] plus this
   };
 

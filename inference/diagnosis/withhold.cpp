@@ -70,7 +70,7 @@ HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) cons
 std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
   using AlarmAndGain = std::pair<double, double>;
   const std::size_t least =
-      least_of_those_that_go(found.best.hypothesis.added(), [&](std::size_t m) -> std::optional<AlarmAndGain> {
+      weakest_removable(found.best.hypothesis.added(), [&](std::size_t m) -> std::optional<AlarmAndGain> {
         const HealthyComparison c = compare(m, found.gains.at(m));
         if (c.stands_out) return std::nullopt;
         return AlarmAndGain(-c.false_alarm, found.gains.at(m));
@@ -104,7 +104,7 @@ void HealthyJudge::cover_true_current(const Survivors& found) {
   }
 }
 
-Survivors HealthyJudge::nothing_of(const Survivors& found) {
+Survivors HealthyJudge::withhold_all(const Survivors& found) {
   for (Withheld& w : withheld_) w.not_covered = true;
   for (const std::size_t m : found.best.hypothesis.added())
     withheld_.push_back({m, *found.best.hypothesis.find(m), found.gains.at(m), compare(m, found.gains.at(m)), true});
@@ -125,7 +125,7 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     found = with_current_sensor(std::move(found));
     cover_true_current(found);
   }
-  if (!is_covered()) return nothing_of(found);
+  if (!is_covered()) return withhold_all(found);
   for (bool removed = true; removed;) {
     removed = false;
     while (std::optional<Withheld> least = least_of(found)) {
@@ -139,7 +139,7 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     if (removed) found = eliminate(search_, likelihood_, control_, found.best, scope_);
   }
   if (!withheld_.empty()) cover_true_current(found);
-  return is_covered() ? found : nothing_of(found);
+  return is_covered() ? found : withhold_all(found);
 }
 
 std::optional<double> HealthyJudge::gain_needed(std::size_t mechanism) const {

@@ -47,11 +47,11 @@ class HealthyJudge {
   HealthyCoverage covered_by(const HypothesisFit& fit) const;
   /// A recording beyond the healthy ones is covered if it is by the best fit or by a rival that equals it.
   void cover_true_current(const Survivors& found);
-  /// What is found if the current sensor is asked first: a recording beyond the healthy ones may be there because of
+  /// Result when current-sensor faults are tried first: a recording beyond the healthy ones may be there because of
   /// it, and its signature, which is linear, says little of a gain that doubles the reading.
   Survivors with_current_sensor(Survivors found);
-  /// Withholds everything: the healthy recordings were not there.
-  Survivors nothing_of(const Survivors& found);
+  /// Withholds everything: the healthy recordings do not cover these.
+  Survivors withhold_all(const Survivors& found);
   HealthyComparison compare(std::size_t mechanism, double gain) const;
   /// The mechanism that stands out least; nothing if all stand out.
   std::optional<Withheld> least_of(const Survivors& found) const;

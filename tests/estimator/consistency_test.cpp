@@ -66,7 +66,7 @@ std::vector<std::pair<int, std::uint64_t>> checks(Consistency<double>& monitor, 
   std::vector<std::pair<int, std::uint64_t>> which;
   for (int k = 1; k <= seconds; ++k) {
     const auto now_us = static_cast<std::uint64_t>(k) * 1'000'000;
-    if (Consistency<double>::turn_ends(now_us - 1'000'000, now_us)) monitor.ask();
+    if (Consistency<double>::turn_ends(now_us - 1'000'000, now_us)) monitor.force_check();
     if (monitor.is_due(0.001)) which.emplace_back(k, monitor.begin(now_us, every));
   }
   return which;
@@ -91,7 +91,7 @@ TEST(Consistency, ASuspectVoltageInBetweenDoesNotMoveTheTurn) {
   EXPECT_FALSE(monitor.is_due(0.001));
   EXPECT_TRUE(monitor.is_due(0.5));
   EXPECT_EQ(monitor.begin(2'000'000, false), 0U);
-  monitor.ask();
+  monitor.force_check();
   EXPECT_EQ(monitor.begin(34'000'000, false), 33'000'000U);
 }
 

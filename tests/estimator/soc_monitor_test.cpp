@@ -22,7 +22,7 @@ std::uint32_t flags_at(double soc, double sigma) {
   SocMonitor<double, Model> monitor;
   monitor.start(cell);
   monitor.watch(cell, constants, state, 1'000'000, 0, 0, 0, true);
-  if (!monitor.has_to_judge(soc, 0)) return 0;
+  if (!monitor.needs_check(soc, 0)) return 0;
   return monitor.judge(cell, {0, 1, 25}, constants, soc, 0, monitor.resistance_error_v2(constants, 0, state), 0, state);
 }
 

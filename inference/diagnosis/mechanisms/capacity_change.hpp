@@ -14,7 +14,7 @@ struct Knowledge<model::CapacityChange> : DefaultKnowledge<model::CapacityChange
   static constexpr MechanismText text = {
       .id = model::CapacityChange::id,
       .name = "a change of capacity",
-      .brief = "the cell holds another charge than its file says",
+      .brief = "the cell's capacity differs from its cell file",
       .mark = "grows with the charge moved and comes back where the charge does",
       .meaning = "The cell has aged, or its file was made for another cell.",
       .action = "Measure the capacity with one full slow discharge and enter it in the cell file."};

@@ -49,9 +49,9 @@ const MechanismSetting& growth_in(const HypothesisFit& f) { return *f.hypothesis
 
 TEST(LeastOfThoseThatGo, IsTheFirstOfEqualsAndNoneIfAllMayStay) {
   const auto weight = [](std::size_t m) { return m == 3 ? std::nullopt : std::optional<int>(m == 5 ? 1 : 0); };
-  EXPECT_EQ(least_of_those_that_go({3, 5, 7, 9}, weight), 7U);
-  EXPECT_EQ(least_of_those_that_go({3, 5}, weight), 5U);
-  EXPECT_EQ(least_of_those_that_go({3}, weight), no_mechanism);
+  EXPECT_EQ(weakest_removable({3, 5, 7, 9}, weight), 7U);
+  EXPECT_EQ(weakest_removable({3, 5}, weight), 5U);
+  EXPECT_EQ(weakest_removable({3}, weight), no_mechanism);
 }
 
 TEST(Scope, KeepsWhatIsCertainInMostOfTheRecording) {

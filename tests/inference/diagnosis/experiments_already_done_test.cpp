@@ -1,5 +1,5 @@
 // Which experiments are recognised among recordings.
-#include "diagnosis/courses_among.hpp"
+#include "diagnosis/experiments_already_done.hpp"
 
 #include <cmath>
 #include <cstddef>
@@ -47,28 +47,30 @@ PreparedRecording recorded(std::string_view name, double capacity_ah, double res
 TEST(CoursesAmong, EachIsRecognisedWhateverItsCapacityAndTheRestBeforeIt) {
   for (const experiments::Experiment& e : experiments::experiments()) {
     if (!std::isfinite(e.start_soc) || e.step_s < 1) continue;
-    EXPECT_THAT(courses_among({recorded(e.name, 6)}, 6), Contains(std::string(e.name)));
-    EXPECT_THAT(courses_among({recorded(e.name, 4.8, 47)}, 6), Contains(std::string(e.name))) << "for a weak cell";
+    EXPECT_THAT(experiments_already_done({recorded(e.name, 6)}, 6), Contains(std::string(e.name)));
+    EXPECT_THAT(experiments_already_done({recorded(e.name, 4.8, 47)}, 6), Contains(std::string(e.name)))
+        << "for a weak cell";
   }
-  EXPECT_THAT(courses_among({recorded("full_cycle", 6)}, 6), ElementsAre("full_cycle"));
-  EXPECT_THAT(courses_among({recorded("climate_steps", 6), recorded("rate_steps", 6)}, 6),
+  EXPECT_THAT(experiments_already_done({recorded("full_cycle", 6)}, 6), ElementsAre("full_cycle"));
+  EXPECT_THAT(experiments_already_done({recorded("climate_steps", 6), recorded("rate_steps", 6)}, 6),
               ElementsAre("rate_steps", "climate_steps"));
 }
 
 TEST(CoursesAmong, OneWhoseTrustedInstrumentsDidNotReadIsNotAmongThem) {
-  EXPECT_THAT(courses_among({recorded("shunt_check", 6)}, 6), ElementsAre("shunt_check"));
-  EXPECT_THAT(courses_among({recorded("terminal_check", 6)}, 6), ElementsAre("shunt_check", "terminal_check"));
-  EXPECT_THAT(courses_among({recorded("terminal_check", 6, 0, false)}, 6), IsEmpty());
-  EXPECT_THAT(courses_among({recorded("meter_check", 6)}, 6), ElementsAre("zero_current", "meter_check"));
-  EXPECT_THAT(courses_among({recorded("zero_current", 6, 0, false)}, 6), IsEmpty());
+  EXPECT_THAT(experiments_already_done({recorded("shunt_check", 6)}, 6), ElementsAre("shunt_check"));
+  EXPECT_THAT(experiments_already_done({recorded("terminal_check", 6)}, 6),
+              ElementsAre("shunt_check", "terminal_check"));
+  EXPECT_THAT(experiments_already_done({recorded("terminal_check", 6, 0, false)}, 6), IsEmpty());
+  EXPECT_THAT(experiments_already_done({recorded("meter_check", 6)}, 6), ElementsAre("zero_current", "meter_check"));
+  EXPECT_THAT(experiments_already_done({recorded("zero_current", 6, 0, false)}, 6), IsEmpty());
 }
 
 TEST(CoursesAmong, ADriveIsNone) {
-  EXPECT_THAT(courses_among({test::recorded(test::drive(4, 1), 0.9, 1)}, 6), IsEmpty());
+  EXPECT_THAT(experiments_already_done({test::recorded(test::drive(4, 1), 0.9, 1)}, 6), IsEmpty());
   PreparedRecording half = recorded("full_cycle", 6);
   for (auto column : {&PreparedRecording::time_s, &PreparedRecording::current_a, &PreparedRecording::voltage_v})
     half.*column = (half.*column).part(0, half.size() / 2);
-  EXPECT_THAT(courses_among({half}, 6), Not(Contains("full_cycle"))) << "interrupted";
+  EXPECT_THAT(experiments_already_done({half}, 6), Not(Contains("full_cycle"))) << "interrupted";
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "diagnosis/courses_among.hpp"
+#include "diagnosis/experiments_already_done.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -127,7 +127,8 @@ bool is_carried_out(const Course& c, const PreparedRecording& r, double capacity
 
 }  // namespace
 
-std::vector<std::string> courses_among(const std::vector<PreparedRecording>& recordings, double capacity_ah) {
+std::vector<std::string> experiments_already_done(const std::vector<PreparedRecording>& recordings,
+                                                  double capacity_ah) {
   std::vector<std::string> names;
   for (const experiments::Experiment& e : experiments::experiments()) {
     if (!std::isfinite(e.start_soc)) continue;
