@@ -5,22 +5,22 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "ammeter/ammeter.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
 #include "reports/report_page.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
-#include "workflow/ammeter.hpp"
 
 namespace bms::tool {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
-using workflow::Ammeter;
-using workflow::amperes;
-using workflow::SensorFinding;
+using ammeter::Ammeter;
+using ammeter::amperes;
+using ammeter::SensorFinding;
 
 struct AmmeterOptions {
   std::string recording, cell = "table9", open_contactors;
@@ -41,7 +41,7 @@ std::string offset_text(const SensorFinding& f) {
 std::string balance_text(const Ammeter& a) {
   const SensorFinding& f = a.balance_a;
   if (!f.value) return f.why;
-  if (workflow::balance_of(a) == workflow::Balance::balanced)
+  if (ammeter::balance_of(a) == ammeter::Balance::balanced)
     return fmt::format("balanced to {} +- {}", amperes(f.value->value), amperes(f.value->std));
   return fmt::format("{} by {} +- {}", f.value->value > 0 ? "short" : "over", amperes(std::abs(f.value->value)),
                      amperes(f.value->std));
@@ -64,10 +64,10 @@ std::string clipping_text(const SensorFinding& f) {
 
 /// A line for each place where a correction is entered.
 std::vector<std::pair<std::string, std::string>> corrections_of(const AmmeterOptions& o, const Ammeter& ammeter) {
-  const workflow::AmmeterCorrection c = workflow::correction_of(ammeter);
+  const ammeter::AmmeterCorrection c = ammeter::correction_of(ammeter);
   std::vector<std::pair<std::string, std::string>> lines;
   if (c.empty()) return lines;
-  const bool confirmed = workflow::balance_of(ammeter) == workflow::Balance::by_sensor;
+  const bool confirmed = ammeter::balance_of(ammeter) == ammeter::Balance::by_sensor;
   if (c.offset_a != 0 && !ammeter.offset_a.why.empty() && !confirmed)
     lines.emplace_back("condition", ammeter.offset_a.why);
   if (std::abs(c.gain) > most_gain || std::abs(c.offset_a) > most_offset_a) {
@@ -116,36 +116,36 @@ std::string undecided_text(const Ammeter& a, const std::string& recording) {
 
 std::string statement_of(const AmmeterOptions& o, const Ammeter& a) {
   if (a.clipping_a.value) return fmt::format("The current sensor is clipped {}.", clipping_text(a.clipping_a));
-  const workflow::Balance balance = workflow::balance_of(a);
-  if (balance == workflow::Balance::undecided) return undecided_text(a, o.recording);
-  if (balance == workflow::Balance::by_cell)
+  const ammeter::Balance balance = ammeter::balance_of(a);
+  if (balance == ammeter::Balance::undecided) return undecided_text(a, o.recording);
+  if (balance == ammeter::Balance::by_cell)
     return fmt::format(
         "The charge balance is {}, but with {} the sensor {}. So {}. Do not correct the sensor for it; "
         "bms diagnose names the cause.",
         balance_text(a), a.open_contactors ? "open contactors" : "no load", offset_text(a.offset_a), cell_causes(a));
   if (!a.offset_a.value) {
-    if (balance == workflow::Balance::balanced) return fmt::format("The charge is {}: no correction.", balance_text(a));
+    if (balance == ammeter::Balance::balanced) return fmt::format("The charge is {}: no correction.", balance_text(a));
     return "This log does not show the offset of the current sensor: " + a.offset_a.why + ".";
   }
   std::string text = fmt::format("The current sensor {}", offset_text(a.offset_a));
-  if (balance == workflow::Balance::by_sensor) text += "; the charge balance shows the same";
+  if (balance == ammeter::Balance::by_sensor) text += "; the charge balance shows the same";
   if (a.gain.value) text += fmt::format("; it {}", gain_text(a.gain));
   text += ".";
-  if (workflow::correction_of(a).empty()) text += " That is within two standard deviations: no correction.";
+  if (ammeter::correction_of(a).empty()) text += " That is within two standard deviations: no correction.";
   return text;
 }
 
-const char* name_of(workflow::Balance balance) {
+const char* name_of(ammeter::Balance balance) {
   switch (balance) {
-    case workflow::Balance::missing:
+    case ammeter::Balance::missing:
       return "missing";
-    case workflow::Balance::balanced:
+    case ammeter::Balance::balanced:
       return "balanced";
-    case workflow::Balance::by_sensor:
+    case ammeter::Balance::by_sensor:
       return "by_sensor";
-    case workflow::Balance::by_cell:
+    case ammeter::Balance::by_cell:
       return "by_cell";
-    case workflow::Balance::undecided:
+    case ammeter::Balance::undecided:
       return "undecided";
   }
   return "";
@@ -161,13 +161,13 @@ std::string json_of(const AmmeterOptions& o, const measurement::Recording& recor
   Json corrections = Json::array(), warnings = Json::array();
   for (const auto& [where, what] : corrections_of(o, a)) corrections.push_back({{"where", where}, {"what", what}});
   for (const measurement::Warning& w : recording.warnings) warnings.push_back(w.id + ": " + w.text);
-  const workflow::AmmeterCorrection c = workflow::correction_of(a);
+  const ammeter::AmmeterCorrection c = ammeter::correction_of(a);
   return Json{{"command", "ammeter"},
               {"statement", statement_of(o, a)},
               {"by", a.by_reference ? "reference" : "cell"},
               {"offset_a", finding_json(a.offset_a)},
               {"balance_a", finding_json(a.balance_a)},
-              {"balance", name_of(workflow::balance_of(a))},
+              {"balance", name_of(ammeter::balance_of(a))},
               {"gain", finding_json(a.gain)},
               {"dead_band_a", finding_json(a.dead_band_a)},
               {"clipping_a", finding_json(a.clipping_a)},
@@ -252,7 +252,7 @@ class AmmeterCommand final : public Command {
     std::optional<measurement::Recording> open;
     if (!o_.open_contactors.empty())
       open = files::read_recording(o_.open_contactors, files::VoltageColumn::optional, o_.reading);
-    const Ammeter ammeter = workflow::examine_ammeter(recording, cell, o_.capacity_sigma, open ? &*open : nullptr);
+    const Ammeter ammeter = ammeter::examine_ammeter(recording, cell, o_.capacity_sigma, open ? &*open : nullptr);
     if (!o_.output.json.empty()) write_output(o_.output.json, json_of(o_, recording, ammeter));
     if (!o_.output.report.empty()) write_output(o_.output.report, report_of(o_, recording, ammeter));
     print(ammeter);

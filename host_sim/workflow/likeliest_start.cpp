@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "files/cell_file.hpp"
+#include "measurement/thinned_recording.hpp"
 #include "replay/simulation.hpp"
-#include "workflow/thinned_recording.hpp"
 
 namespace bms::workflow {
 
@@ -23,7 +23,7 @@ constexpr double least_error_v = 1e-3;
 class StartCost {
  public:
   StartCost(const measurement::Recording& recording, const files::CellFile& cell, const StartSoc& from)
-      : recording_(thinned(recording, most_rows)), cell_(cell), from_(from) {
+      : recording_(measurement::thinned(recording, most_rows)), cell_(cell), from_(from) {
     const auto& p = cell.parameters;
     error_v_ = std::max(least_error_v, std::hypot(p.noise.model_v, p.tolerance.ocv_v));
     const double duration_s = recording.time_s.back() - recording.time_s.front();

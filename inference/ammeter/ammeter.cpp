@@ -1,4 +1,4 @@
-#include "workflow/ammeter.hpp"
+#include "ammeter/ammeter.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,11 +9,11 @@
 
 #include <fmt/format.h>
 
+#include "ammeter/ammeter_at_rest.hpp"
+#include "ammeter/ammeter_by_cell.hpp"
 #include "files/bad_input.hpp"
-#include "workflow/ammeter_at_rest.hpp"
-#include "workflow/ammeter_by_cell.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 namespace {
 
@@ -338,4 +338,4 @@ AmmeterCorrection correction_of(const Ammeter& ammeter) {
   return {1 / (1 + gain) - 1, -offset_a / (1 + gain)};
 }
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

@@ -1,4 +1,4 @@
-#include "workflow/ammeter_at_rest.hpp"
+#include "ammeter/ammeter_at_rest.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -8,7 +8,7 @@
 
 #include "measurement/statistics.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 namespace {
 
@@ -120,4 +120,4 @@ SensorFinding reading_without_current(const measurement::Recording& r) {
   return found;
 }
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

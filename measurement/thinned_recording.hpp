@@ -5,11 +5,11 @@
 
 #include "measurement/recording.hpp"
 
-namespace bms::workflow {
+namespace bms::measurement {
 
 /// Rows of about the same duration, at most `most` + 1 of them, fewer with gaps: current, voltage and temperature are
 /// means over the rows that they replace, the current by time. Other columns are left out. A recording that is short
 /// enough stays as it is.
-measurement::Recording thinned(const measurement::Recording& recording, std::size_t most);
+Recording thinned(const Recording& recording, std::size_t most);
 
-}  // namespace bms::workflow
+}  // namespace bms::measurement

@@ -17,7 +17,7 @@
 #include "files/cell_file.hpp"
 #include "measurement/recording.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 struct Uncertain {
   double value = 0, std = 0;
@@ -72,4 +72,4 @@ struct AmmeterCorrection {
 };
 AmmeterCorrection correction_of(const Ammeter& ammeter);
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

@@ -3,11 +3,11 @@
 
 #include <vector>
 
+#include "ammeter/ammeter.hpp"
 #include "files/cell_file.hpp"
 #include "measurement/recording.hpp"
-#include "workflow/ammeter.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 struct AmmeterByCell {
   SensorFinding offset_a;       ///< of the charge balance: the sensor's, if the cell loses no charge
@@ -23,4 +23,4 @@ struct AmmeterByCell {
 /// state of charge, of the relaxation over an hour, of the model over minutes.
 AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const files::CellFile& cell);
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

@@ -1,6 +1,6 @@
 // The current sensor from a log: shifts of the plant (which shares nothing with the model) with errors added to the
 // current that its instruments read.
-#include "workflow/ammeter.hpp"
+#include "ammeter/ammeter.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -11,7 +11,7 @@
 #include "experiments/experiment.hpp"
 #include "tests/truth/forklift_shift.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 namespace {
 
 using ::testing::HasSubstr;
@@ -294,4 +294,4 @@ TEST(Ammeter, ADeadBandBelowTheUncertaintyLeavesTheOffset) {
 }
 
 }  // namespace
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

@@ -1,10 +1,10 @@
-#include "workflow/thinned_recording.hpp"
+#include "measurement/thinned_recording.hpp"
 
 #include <cmath>
 #include <limits>
 #include <vector>
 
-namespace bms::workflow {
+namespace bms::measurement {
 
 namespace {
 
@@ -28,7 +28,7 @@ class Mean {
 
 }  // namespace
 
-measurement::Recording thinned(const measurement::Recording& r, std::size_t most) {
+Recording thinned(const Recording& r, std::size_t most) {
   if (r.rows() <= most) return r;
   const double step_s = r.duration_s() / static_cast<double>(most);
   Mean current, voltage, temperature;
@@ -46,7 +46,7 @@ measurement::Recording thinned(const measurement::Recording& r, std::size_t most
     if (!r.voltage_v.empty()) voltage_v.push_back(voltage.take());
     if (!r.temperature_c.empty()) temperature_c.push_back(temperature.take());
   }
-  measurement::Recording out;
+  Recording out;
   out.path = r.path;
   out.time_s = std::move(time_s);
   out.current_a = std::move(current_a);
@@ -55,4 +55,4 @@ measurement::Recording thinned(const measurement::Recording& r, std::size_t most
   return out;
 }
 
-}  // namespace bms::workflow
+}  // namespace bms::measurement

@@ -15,15 +15,15 @@
 
 #include <fmt/format.h>
 
+#include "ammeter/ammeter.hpp"
 #include "files/committed_figures.hpp"
 #include "files/recording.hpp"
-#include "workflow/ammeter.hpp"
 
 namespace bms {
 namespace {
 
-using workflow::Ammeter;
-using workflow::SensorFinding;
+using ammeter::Ammeter;
+using ammeter::SensorFinding;
 
 const std::filesystem::path source = BMS_SOURCE_DIR, data = BMS_DATA_DIR;
 constexpr double most_sigmas = 3;  ///< an answer that is further off is wrong
@@ -126,7 +126,7 @@ Tables tables_of(const std::vector<std::string>& names, bool print) {
     for (std::size_t k = 0; k < std::size(planted); ++k) {
       const Planted& p = planted[k];
       const double capacity_ah = cell.parameters.capacity_ah;
-      const Ammeter a = workflow::examine_ammeter(with(clean, p, capacity_ah), cell, {});
+      const Ammeter a = ammeter::examine_ammeter(with(clean, p, capacity_ah), cell, {});
       const bool clipped = p.largest_share < 1;
       const bool banded = p.dead_band_share > 0;
       const std::string row =

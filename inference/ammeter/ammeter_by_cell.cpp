@@ -1,4 +1,4 @@
-#include "workflow/ammeter_by_cell.hpp"
+#include "ammeter/ammeter_by_cell.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,10 +11,10 @@
 
 #include <fmt/format.h>
 
+#include "measurement/thinned_recording.hpp"
 #include "replay/simulation.hpp"
-#include "workflow/thinned_recording.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 namespace {
 
@@ -320,7 +320,7 @@ std::vector<Fit::Result> results_of(Fit& fit) {
 
 AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const files::CellFile& cell) {
   AmmeterByCell found;
-  const measurement::Recording rows = thinned(recording, most_fit_rows);
+  const measurement::Recording rows = measurement::thinned(recording, most_fit_rows);
   Fit fit(rows, cell);
   if (fit.blocks() < fewest_blocks) {
     found.offset_a.why = "the log is too short; some hours with a rest would show it";
@@ -368,4 +368,4 @@ AmmeterByCell ammeter_by_cell(const measurement::Recording& recording, const fil
   return found;
 }
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter

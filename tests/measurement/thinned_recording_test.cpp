@@ -1,11 +1,11 @@
-#include "workflow/thinned_recording.hpp"
+#include "measurement/thinned_recording.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
-namespace bms::workflow {
+namespace bms::measurement {
 namespace {
 
 /// One row a second, then one every seven seconds.
@@ -54,4 +54,4 @@ TEST(ThinnedRecording, AMissingReadingDoesNotSpoilTheMean) {
 }
 
 }  // namespace
-}  // namespace bms::workflow
+}  // namespace bms::measurement

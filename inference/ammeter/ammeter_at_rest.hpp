@@ -1,11 +1,11 @@
 // What a current sensor reads at rest.
 #pragma once
 
+#include "ammeter/ammeter.hpp"
 #include "files/cell_file.hpp"
 #include "measurement/recording.hpp"
-#include "workflow/ammeter.hpp"
 
-namespace bms::workflow {
+namespace bms::ammeter {
 
 /// The mean reading over stretches of two to ten minutes in which the reading is small and constant. It is the offset
 /// if no current flows then; the remark says so. No answer if the stretches differ, if they are fewer than three, or if
@@ -17,4 +17,4 @@ SensorFinding reading_at_rest(const measurement::Recording& recording, const fil
 /// minutes.
 SensorFinding reading_without_current(const measurement::Recording& recording);
 
-}  // namespace bms::workflow
+}  // namespace bms::ammeter
