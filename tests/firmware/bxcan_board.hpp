@@ -69,7 +69,7 @@ inline const std::vector<std::uint8_t>& started_once() {
 /// The frames that the application on this machine sends.
 inline std::vector<can::Frame> expected_frames(const std::vector<Pack>& part) {
   HostBoard host(started_once());
-  for (const Pack& p : part) host.process_sample({p, 0, {}});
+  for (const Pack& p : part) host.process_sample({p, {0, 0}});
   return sent;
 }
 
@@ -130,7 +130,7 @@ class BxcanBoard : public ::testing::Test {
   /// Sends a sample every 100 ms over the bus, from now on.
   void queue(const std::vector<Pack>& some) {
     std::vector<Input> inputs;
-    for (const Pack& p : some) inputs.push_back({p, 0, {}});
+    for (const Pack& p : some) inputs.push_back({p, {0, 0}});
     queue_for(board, inputs);
   }
   /// Delivers a sample without the bus, as fast as the firmware reads the controller.

@@ -91,7 +91,7 @@ TEST_F(BxcanBoard, BusHasTheFramesOfTheApplicationBitForBitFromStartToDriving) {
 /// Sends samples to a board and lets it process them.
 void run(UnicornBoard& board, const std::vector<Pack>& some) {
   std::vector<Input> inputs;
-  for (const Pack& p : some) inputs.push_back({p, 0, {}});
+  for (const Pack& p : some) inputs.push_back({p, {0, 0}});
   queue_for(board, inputs);
   board.run_for_ms(100 * static_cast<double>(some.size()) + 50);
 }
@@ -99,7 +99,7 @@ void run(UnicornBoard& board, const std::vector<Pack>& some) {
 /// Flash content of the application on this machine after these samples.
 std::vector<std::uint8_t> flash_after(const std::vector<Pack>& part, const measurement::StartingPoint& start) {
   HostBoard host(started_once(), start);
-  for (const Pack& p : part) host.process_sample({p, 0, {}});
+  for (const Pack& p : part) host.process_sample({p, {0, 0}});
   EXPECT_GE(host.persistence().charge().operating_s, 60U);
   const auto code =
       static_cast<std::uint16_t>(first_fault_code + static_cast<std::uint16_t>(protection::Fault::temperature_lost));
@@ -120,7 +120,7 @@ void expect_restart(const std::vector<std::uint8_t>& flash, const Pack& sample, 
   again.reset_flags = expected_start.csr;
   cause = expected_start.cause;
   HostBoard host(flash);
-  host.process_sample({sample, 0, {}});
+  host.process_sample({sample, {0, 0}});
   cause = hal::ResetCause::power_on;
   run(again, {sample});
   std::map<unsigned, can::Frame> seen, expected;

@@ -85,7 +85,7 @@ TEST_F(BxcanBoard, J1939ProfileSends29BitFramesAfterTheOwnOnesWithinTheBudgets) 
   ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
   const auto part = part_of_the_shift(3);
   std::vector<Input> inputs;
-  for (const Pack& p : part) inputs.push_back({p, 0, {}});
+  for (const Pack& p : part) inputs.push_back({p, {0, 0}});
   queue_for(other, inputs);
   other.run_for_ms(400);
   std::map<std::uint32_t, std::vector<can::Frame>> seen;
@@ -124,7 +124,7 @@ TEST_F(BxcanBoard, Cia418ProfileSendsPdosAndAnswersAChargerWithinTheBudgets) {
   other.flash.bytes = started_once();
   ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
   other.can.others.push_back({wire_frame({0x601, 8, {0x40, 0x00, 0x10, 0}}), other.can.now_bit});
-  queue_for(other, {{part_of_the_shift(1)[0], 0, {}}});
+  queue_for(other, {{part_of_the_shift(1)[0], {0, 0}}});
   other.run_for_ms(200);
   std::map<std::uint32_t, can::Frame> seen;
   for (const SeenFrame& s : other.can.seen) {

@@ -50,7 +50,7 @@ class I2cControllerModel : public UnicornBoard::Peripheral {
   Bq76952Model& chip_;
   Phase phase_ = Phase::idle;
   std::uint32_t cr1_ = 0, cr2_ = 0;
-  double ready_us_ = 0, freed_us_ = 0;
+  double ready_us_ = 0;
   bool sb_ = false, address_ = false, received_ = false, shift_full_ = false, empty_ = false, refused_ = false,
        bus_error_ = false, arbitration_ = false, status_read_ = false, stop_wanted_ = false, reading_ = false,
        last_acked_ = false, dr_waits_ = false;
