@@ -18,6 +18,8 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <functional>
+#include <map>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -473,36 +475,39 @@ void run() {
   write_identification();
 }
 
+/// What an argument of the program writes; without one, everything is written.
+const std::map<std::string_view, std::function<void()>> parts = {
+    {"step", [] { fmt::print("{}\n{}\n{}", step_cost(), microbit_cost(), filter_forms()); }},  // prints it
+    {"filter", [] { files::replace_figures(source / "estimator/README.md", "filter forms", filter_forms()); }},
+    {"readme", write_front_page},
+    {"accuracy", write_accuracy},
+    {"board", write_board},
+    {"budgets", [] { files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table()); }},
+    {"protection",
+     [] { files::replace_figures(source / "firmware/protection/README.md", "netduinoplus2", protection_cost()); }},
+    {"trials", write_trials},
+    {"fixed", [] { files::replace_figures(source / "boards/microbit/README.md", "fixed", fixed_point()); }},
+    {"identification", write_identification},
+    {"real", write_real_identification},
+};
+
 }  // namespace
 }  // namespace bms
 
 int main(int argc, char** argv) {
   try {
-    if (argc > 1 && std::string_view(argv[1]) == "step")
-      fmt::print("{}\n{}\n{}", bms::step_cost(), bms::microbit_cost(), bms::filter_forms());
-    else if (argc > 1 && std::string_view(argv[1]) == "filter")
-      bms::files::replace_figures(bms::source / "estimator/README.md", "filter forms", bms::filter_forms());
-    else if (argc > 1 && std::string_view(argv[1]) == "readme")
-      bms::write_front_page();
-    else if (argc > 1 && std::string_view(argv[1]) == "accuracy")
-      bms::write_accuracy();
-    else if (argc > 1 && std::string_view(argv[1]) == "board")
-      bms::write_board();
-    else if (argc > 1 && std::string_view(argv[1]) == "budgets")
-      bms::files::replace_figures(bms::source / "boards/README.md", "budgets", bms::firmware::board_table());
-    else if (argc > 1 && std::string_view(argv[1]) == "protection")
-      bms::files::replace_figures(bms::source / "firmware/protection/README.md", "netduinoplus2",
-                                  bms::protection_cost());
-    else if (argc > 1 && std::string_view(argv[1]) == "trials")
-      bms::write_trials();
-    else if (argc > 1 && std::string_view(argv[1]) == "fixed")
-      bms::files::replace_figures(bms::source / "boards/microbit/README.md", "fixed", bms::fixed_point());
-    else if (argc > 1 && std::string_view(argv[1]) == "identification")
-      bms::write_identification();
-    else if (argc > 1 && std::string_view(argv[1]) == "real")
-      bms::write_real_identification();
-    else
+    if (argc < 2) {
       bms::run();
+      return 0;
+    }
+    const auto part = bms::parts.find(argv[1]);
+    if (argc > 2 || part == bms::parts.end()) {
+      fmt::print(stderr, "figures: expected nothing or one of");
+      for (const auto& [name, write] : bms::parts) fmt::print(stderr, " {}", name);
+      fmt::print(stderr, "\n");
+      return 2;
+    }
+    part->second();
     return 0;
   } catch (const std::exception& e) {
     fmt::print(stderr, "figures: {}\n", e.what());
