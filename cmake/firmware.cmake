@@ -135,7 +135,7 @@ include(${root}/cmake/can_messages.cmake)
 # bms_objects(NAME OPTIMISATION SOURCE...)
 function(bms_objects name optimisation)
   add_library(${name} OBJECT ${ARGN})
-  target_link_libraries(${name} PUBLIC bms_estimator bms_board)
+  target_link_libraries(${name} PUBLIC bms_estimator bms_board bms_can)
   target_compile_options(${name} PRIVATE ${optimisation})
 endfunction()
 

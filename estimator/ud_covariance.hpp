@@ -89,8 +89,7 @@ class UdCovariance {
       const Coupling share = arithmetic::ratio<Coupling>(d[N - 1], sum);
 #pragma GCC unroll 8
       for (std::size_t i = 0; i + 1 < N; ++i)
-        u(i, N - 1) =
-            kept(arithmetic::product<Coupling>(arithmetic::product<Coupling>(share, state[i][N - 1]), f_last));
+        u(i, N - 1) = arithmetic::product<Coupling>(arithmetic::product<Coupling>(share, state[i][N - 1]), f_last);
       d_[N - 1] = sum;
       d[N - 1] = arithmetic::product<Variance>(q[N - 1], share);
     }
@@ -119,13 +118,18 @@ class UdCovariance {
         for (std::size_t k = j + 1; k + 1 < N; ++k)
           cross = Variance(
               cross + arithmetic::product<Variance>(arithmetic::product<Variance>(q[k], noise[j][k]), noise[i][k]));
-        const Coupling projected = kept(arithmetic::ratio<Coupling>(cross, sum));
+        const Coupling projected = arithmetic::ratio<Coupling>(cross, sum);
         u(i, j) = projected;
 #pragma GCC unroll 8
         for (std::size_t k = j; k < N; ++k) state[i][k] = Coupling(state[i][k] - projected * state[j][k]);
         noise[i][j] = -projected;  // row j's own noise has weight 1
 #pragma GCC unroll 8
         for (std::size_t k = j + 1; k + 1 < N; ++k) noise[i][k] = Coupling(noise[i][k] - projected * noise[j][k]);
+      }
+    }
+    if constexpr (N > 2 && std::floating_point<S>) {
+      for (Coupling& coupling : u_) {
+        if (arithmetic::magnitude(coupling) < S(1e-9)) coupling = S(0);
       }
     }
   }
@@ -177,13 +181,6 @@ class UdCovariance {
 
  private:
   friend struct LaneAccess;
-
-  static constexpr Coupling kept(const Coupling& coupling) {
-    if constexpr (N > 2 && std::floating_point<S>)
-      return arithmetic::magnitude(coupling) < S(1e-9) ? S(0) : coupling;
-    else
-      return coupling;
-  }
 
   static constexpr std::size_t place(std::size_t i, std::size_t j) { return j * (j - 1) / 2 + i; }
   constexpr Coupling& u(std::size_t i, std::size_t j) { return u_[place(i, j)]; }
