@@ -73,7 +73,7 @@ TEST_F(SlurmEngine, AKilledTaskIsRunAgainAndTheTableIsThatOfTheLocalEngine) {
   std::filesystem::permissions(folder_.path(), std::filesystem::perms(0755));
   write_depot(200, 2'000);
   ASSERT_EQ(run_tool(command("local")).exit_code, 0);
-  const std::string log = path("log"), scripts = BMS_SOURCE_DIR "/tests/fleet/";
+  const std::string log = path("log"), scripts = BMS_SOURCE_DIR "/tests/host_sim/fleet/";
   const int status = std::system(("cd " + folder_.path().string() + " && " + scripts + "with_slurm.sh " + path("s") +
                                   " " + scripts + "kill_a_task.sh " BMS_TOOL " " + path("slurm") + " " +
                                   command("slurm") + "--engine slurm --units-per-task 25 >" + log + " 2>&1")

@@ -473,7 +473,7 @@ class ComparedWithScipy : public ::testing::Test {
     }
     std::ostringstream command;
     command.precision(17);
-    command << python_ << " " << BMS_SOURCE_DIR << "/tests/identification/scipy_reference.py " << csv;
+    command << python_ << " " << BMS_SOURCE_DIR << "/tests/inference/identification/scipy_reference.py " << csv;
     for (const VectorXd& bounds : {problem.lower, problem.upper}) {
       for (const double b : bounds) command << ' ' << b;
     }

@@ -26,7 +26,8 @@ inline std::map<std::string, std::vector<double>> scipy_reference() {
   std::map<std::string, std::vector<double>> columns;
   const std::string python = python_with_scipy();
   if (python.empty()) return columns;
-  FILE* pipe = popen((python + " " BMS_SOURCE_DIR "/tests/identification/scipy_linear_reference.py").c_str(), "r");
+  FILE* pipe =
+      popen((python + " " BMS_SOURCE_DIR "/tests/inference/identification/scipy_linear_reference.py").c_str(), "r");
   if (pipe == nullptr) return columns;
   std::string text;
   for (int c; (c = std::fgetc(pipe)) != EOF;) text += static_cast<char>(c);
