@@ -70,8 +70,9 @@ TEST(Scope, KeepsWhatIsCertainInMostOfTheRecording) {
 
 TEST(IsDoubted, IfAForeignLawExplainsMoreByNoMoreThanATie) {
   const double tie = thresholds.decision.tie;
-  const auto doubted = [&](double foreign, double remaining) {
-    return is_doubted({{"slow", "time", 90, 0}, {"voltage", "time", 80, foreign}}, 60, remaining);
+  const auto doubted = [&](double outside_catalogue, double remaining) {
+    return another_law_explains_more({{"slow", "time", 90, 0}, {"voltage", "time", 80, outside_catalogue}}, 60,
+                                     remaining);
   };
   EXPECT_TRUE(doubted(50.5 - tie, 10)) << "the causes explain 60 and leave 10";
   EXPECT_FALSE(doubted(49.5 - tie, 10));

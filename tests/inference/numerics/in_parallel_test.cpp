@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-namespace bms::measurement {
+namespace bms::numerics {
 namespace {
 
 TEST(InParallel, EachPieceIsDoneOnce) {
@@ -74,4 +74,4 @@ TEST(InParallel, PiecesShareTheProcessors) {
 }
 
 }  // namespace
-}  // namespace bms::measurement
+}  // namespace bms::numerics
