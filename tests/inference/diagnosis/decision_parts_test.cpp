@@ -68,7 +68,7 @@ TEST(Scope, KeepsWhatIsCertainInMostOfTheRecording) {
   EXPECT_THAT(scope(0.6).kept, ElementsAre(by_temperature));
 }
 
-TEST(IsDoubted, IfAForeignLawExplainsMoreByNoMoreThanATie) {
+TEST(AnotherLawExplainsMore, ByNoMoreThanATie) {
   const double tie = thresholds.decision.tie;
   const auto doubted = [&](double outside_catalogue, double remaining) {
     return another_law_explains_more({{"slow", "time", 90, 0}, {"voltage", "time", 80, outside_catalogue}}, 60,
