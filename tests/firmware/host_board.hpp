@@ -55,7 +55,7 @@ class HostBoard {
     host_hal::switched = {};
     persistence_.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
     application_.emplace(start ? start : stored_starting_point(persistence_, host_hal::cell_hash),
-                         messages::Identity{host_hal::cell_hash, 0x000100},
+                         messages::Identity{host_hal::cell_hash, 0x000200},
                          static_cast<float>(tests::table9.capacity_ah), persistence_);
   }
   ~HostBoard() { plug_in(nullptr); }
