@@ -103,7 +103,7 @@ TEST_F(Vcan, MonitorAndCandumpAgreeWithReplayOnANoisyBus) {
   EXPECT_GT(std::abs(soc.back() - soc.front()), 1e-3) << "the state of charge must change";
 
   const ToolRun other =
-      run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/can/greybox_bms.dbc "
+      run_shell(fmt::format("/usr/bin/python3 {}/tests/vcan/compare_with_canmatrix.py {}/firmware/can/greybox_bms.dbc "
                             "{f}/candump.log {f}/rows.csv {f}/monitor.json",
                             BMS_SOURCE_DIR, BMS_SOURCE_DIR, fmt::arg("f", folder.path().string())));
   EXPECT_EQ(other.exit_code, 0) << other.out << other.err;
