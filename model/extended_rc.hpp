@@ -317,13 +317,15 @@ struct ExtendedRc {
     }
 
    private:
-    /// Voltage states that there are, of the places for them.
+    /// Places for voltages that have a state. States beyond the places are not corrected.
     template <class SomeLaws>
     static constexpr std::size_t voltages(const SomeLaws& laws) {
-      if constexpr (SomeLaws::all_act)
+      if constexpr (SomeLaws::all_act) {
         return Voltages;
-      else
-        return laws.voltage_states();
+      } else {
+        const std::size_t count = laws.voltage_states();
+        return count < Voltages ? count : Voltages;
+      }
     }
     /// v times numerator / denominator, both of the same sign; 2 V at most.
     static constexpr Voltage<S> scaled_by(const Voltage<S>& v, const Voltage<S>& numerator,
