@@ -52,7 +52,7 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 # what a command needs that builds or runs firmware
 string(CONCAT CPACK_DEBIAN_PACKAGE_RECOMMENDS "cmake, ninja-build, gcc-arm-none-eabi, libnewlib-arm-none-eabi, "
-  "libstdc++-arm-none-eabi-newlib, qemu-system-arm")
+  "libstdc++-arm-none-eabi-newlib, qemu-system-arm, python3")
 set(CPACK_DEBIAN_PACKAGE_SUGGESTS openocd)
 set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)  # a package needs the tool, not the tests
 include(CPack)

@@ -212,7 +212,7 @@ way_cores() {
   m4f="-mcpu=cortex-m4 -mthumb -mfloat-abi=hard -mfpu=fpv4-sp-d16" m0="-mcpu=cortex-m0 -mthumb"
   fresh crossing
   packages /opt/greybox-bms.deb cmake ninja-build gcc-arm-none-eabi libnewlib-arm-none-eabi \
-    libstdc++-arm-none-eabi-newlib qemu-system-arm
+    libstdc++-arm-none-eabi-newlib qemu-system-arm python3
   consume m4f "-DGREYBOX_BY=find -DCMAKE_FIND_ROOT_PATH=/usr -DCMAKE_C_FLAGS='$m4f' -DCMAKE_CXX_FLAGS='$m4f' $toolchain"
   step "remove" <<<'rm -r /opt/consumer'
   consume m0 "-DGREYBOX_BY=find -DCMAKE_FIND_ROOT_PATH=/usr -DBMS_FIXED=FIXED -DCMAKE_C_FLAGS='$m0' \
