@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "files/bad_input.hpp"
 #include "files/logs/text_lines.hpp"
 #include "measurement/recording_checks.hpp"

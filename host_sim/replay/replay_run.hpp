@@ -123,27 +123,30 @@ Track run_estimator(const Cell& cell, const measurement::SampleList& samples,
 /// Places for voltages of mechanisms, besides as many as there can be: as the built-in extended cells have.
 inline constexpr std::size_t usual_voltages = 3;
 
-/// Places that are left do not change the estimates.
-template <class S, bool Errors, std::size_t Voltages = usual_voltages>
-Track run_extended(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell,
-                   const measurement::SampleList& samples, const std::optional<measurement::StartingPoint>& start,
-                   Timing timing) {
-  using Laws = model::ChosenLaws<S>;
-  if constexpr (Voltages < Laws::most_voltage_states) {
-    if (cell.laws.voltage_states() > Voltages)
-      return run_extended<S, Errors, Laws::most_voltage_states>(cell, samples, start, timing);
-  }
-  return run_estimator<estimator::SocEstimator<S, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>>(
-      cell, samples, start, (Errors ? error_values : 0) + cell.laws.states(), timing);
+template <class S, std::size_t Voltages, bool Errors>
+using ExtendedEstimator =
+    estimator::SocEstimator<S, model::ExtendedRc<Voltages, model::ChosenLaws<S>::most_states, Errors>::template Of>;
+
+/// Returns run(std::type_identity<E>()) for the estimator E that has room for these laws. Places that are left do not
+/// change the estimates. errors: sensor errors are states of the filter.
+template <class S, class Run>
+auto with_estimator_for(const model::ChosenLaws<S>& laws, bool errors, Run run) {
+  constexpr std::size_t most = model::ChosenLaws<S>::most_voltage_states;
+  const bool usual = laws.voltage_states() <= usual_voltages;
+  if (errors)
+    return usual ? run(std::type_identity<ExtendedEstimator<S, usual_voltages, true>>())
+                 : run(std::type_identity<ExtendedEstimator<S, most, true>>());
+  return usual ? run(std::type_identity<ExtendedEstimator<S, usual_voltages, false>>())
+               : run(std::type_identity<ExtendedEstimator<S, most, false>>());
 }
 
-/// errors: sensor errors are states of the filter.
 template <class S>
 Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, bool errors,
                           const measurement::SampleList& samples,
                           const std::optional<measurement::StartingPoint>& start, Timing timing) {
-  return errors ? run_extended<S, true>(cell, samples, start, timing)
-                : run_extended<S, false>(cell, samples, start, timing);
+  return with_estimator_for<S>(cell.laws, errors, [&]<class E>(std::type_identity<E>) {
+    return run_estimator<E>(cell, samples, start, (errors ? error_values : 0) + cell.laws.states(), timing);
+  });
 }
 
 using FixedExtendedCell =

@@ -24,20 +24,6 @@ class SteppedEstimator final : public Stepper {
   Estimator estimator_;
 };
 
-using Laws = model::ChosenLaws<float>;
-/// Evaluated here: within the template below, g++ 14 has not yet instantiated the functions that it needs.
-constexpr std::size_t most_voltages = Laws::most_voltage_states;
-
-/// As replay_detail::run_extended().
-template <bool Errors, std::size_t Voltages = replay_detail::usual_voltages>
-std::unique_ptr<Stepper> extended(const Extended& cell, const std::optional<measurement::StartingPoint>& start) {
-  if constexpr (Voltages < most_voltages) {
-    if (cell.laws.voltage_states() > Voltages) return extended<Errors, most_voltages>(cell, start);
-  }
-  using Estimator = estimator::SocEstimator<float, model::ExtendedRc<Voltages, Laws::most_states, Errors>::template Of>;
-  return std::make_unique<SteppedEstimator<Estimator, Extended>>(cell, start);
-}
-
 }  // namespace
 
 std::unique_ptr<Stepper> make_stepper(const files::CellFile& file,
@@ -48,7 +34,10 @@ std::unique_ptr<Stepper> make_stepper(const files::CellFile& file,
   if (mechanisms.empty() && !errors)
     return std::make_unique<SteppedEstimator<estimator::SocEstimator<float>, HostCell<float>>>(cell, start);
   const Extended with_laws{cell, model::chosen<float>(mechanisms, file.parameters.capacity_ah)};
-  return errors ? extended<true>(with_laws, start) : extended<false>(with_laws, start);
+  return replay_detail::with_estimator_for<float>(
+      with_laws.laws, errors, [&]<class E>(std::type_identity<E>) -> std::unique_ptr<Stepper> {
+        return std::make_unique<SteppedEstimator<E, Extended>>(with_laws, start);
+      });
 }
 
 }  // namespace bms::replay

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <ctime>
 #include <fstream>
 #include <limits>
 #include <map>
@@ -20,6 +19,7 @@
 #include <gtest/gtest.h>
 
 #include "files/temporary_folder.hpp"
+#include "replay/processor_time.hpp"
 #include "tests/inference/identification/more_garbow_hillstrom.hpp"
 #include "tests/inference/identification/scipy.hpp"
 
@@ -420,32 +420,28 @@ TEST(LeastSquares, AlgebraOfOneIterationIsSmall) {
   const MatrixXd a = MatrixXd::Random(m, n);
   const VectorXd b = VectorXd::Random(m);
   double in_evaluation_s = 0, product_s = infinity;
-  const auto now_s = [] {
-    timespec t{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
-  };
   LeastSquares problem;
   problem.evaluate = [&](const VectorXd& x, VectorXd& r, MatrixXd* jacobian) {
-    const double begin_s = now_s();
+    const double begin_s = replay::processor_time_s();
     r = (a * x).array().cube().matrix() + a * x - b;
     if (jacobian != nullptr) *jacobian = ((a * x).array().square() * 3 + 1).matrix().asDiagonal() * a;
-    in_evaluation_s += now_s() - begin_s;
+    in_evaluation_s += replay::processor_time_s() - begin_s;
     return true;
   };
   for (int round = 0; round < 20; ++round) {
-    const double begin_s = now_s();
+    const double begin_s = replay::processor_time_s();
     const MatrixXd product = a.transpose() * a;
     ASSERT_GT(product(0, 0), 0);
-    product_s = std::min(product_s, now_s() - begin_s);
+    product_s = std::min(product_s, replay::processor_time_s() - begin_s);
   }
   for (const Method method : all_methods) {
     double algebra_s = infinity;
     for (int round = 0; round < 5; ++round) {  // the fastest round, because caches are shared with other programs
       in_evaluation_s = 0;
-      const double begin_s = now_s();
+      const double begin_s = replay::processor_time_s();
       const Optimum found = minimise(problem, VectorXd::Ones(n), method);
-      algebra_s = std::min(algebra_s, (now_s() - begin_s - in_evaluation_s) / (found.iterations + 1));
+      algebra_s =
+          std::min(algebra_s, (replay::processor_time_s() - begin_s - in_evaluation_s) / (found.iterations + 1));
       EXPECT_TRUE(found.converged) << name_of(method) << ": " << found.reason;
     }
     RecordProperty(std::string("algebra_products_") + name_of(method), static_cast<int>(algebra_s / product_s));
