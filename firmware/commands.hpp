@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "hal/accepted_frames.hpp"
 #include "protection/contactors.hpp"
 #include "protection/fault_monitor.hpp"

@@ -11,7 +11,7 @@
 #include <optional>
 
 #include "authentication/codes.hpp"
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "firmware/challenge_source.hpp"
 #include "protection/contactors.hpp"
 

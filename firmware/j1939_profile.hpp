@@ -15,7 +15,7 @@
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
 #include "hal/can.hpp"
-#include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
+#include "j1939_messages.hpp"  // generated from firmware/can/j1939_profile.dbc
 
 namespace bms::firmware {
 

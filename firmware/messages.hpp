@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"

@@ -15,7 +15,7 @@
 #include <optional>
 
 #include "authentication/codes.hpp"
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "firmware/challenge_source.hpp"
 
 namespace bms::firmware {

@@ -7,7 +7,7 @@
 #include <array>
 #include <cstdint>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "firmware/commands.hpp"
 #include "hal/can.hpp"
 #include "storage/persistence.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "monitor/bus_state.hpp"
 
 namespace bms::hil {

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "files/bad_input.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/slcan/codec.hpp"

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "hal/sample_frames.hpp"
 #include "hil/load_profile.hpp"
 #include "measurement/statistics.hpp"

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <type_traits>
 
-#include "can_messages.hpp"    // generated from can/greybox_bms.dbc
-#include "j1939_messages.hpp"  // generated from can/j1939_profile.dbc
+#include "can_messages.hpp"    // generated from firmware/can/greybox_bms.dbc
+#include "j1939_messages.hpp"  // generated from firmware/can/j1939_profile.dbc
 
 namespace bms::monitor {
 

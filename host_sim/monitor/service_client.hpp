@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "authentication/codes.hpp"
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 
 namespace bms::monitor {
 

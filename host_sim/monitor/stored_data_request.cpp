@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 
 namespace bms::monitor {
 

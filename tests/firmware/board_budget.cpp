@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
 #include "files/temporary_folder.hpp"

@@ -11,7 +11,7 @@
 
 #include <fmt/format.h>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "estimator/estimate.hpp"
 #include "files/cell_file.hpp"
 #include "hal/bytes.hpp"

@@ -2,7 +2,7 @@
 // cells and protects the last of them.
 #include <map>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "tests/firmware/bxcan_board.hpp"
 
 namespace bms::firmware {

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "can_messages.hpp"  // generated from can/greybox_bms.dbc
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 
 namespace bms::world {
 
