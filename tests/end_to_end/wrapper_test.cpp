@@ -12,6 +12,7 @@
 namespace bms {
 namespace {
 
+using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsSubsetOf;
 using ::testing::Not;
@@ -37,10 +38,14 @@ class Wrapper : public ::testing::Test {
     std::filesystem::copy_file(wrapper, checkout_ / "bms");
     std::filesystem::create_directory(programs_);
     for (const char* program : {"apt-get", "sudo", "cmake", "ninja", "dpkg-query"}) {
-      const auto path = programs_ / program;
-      files::write_file(path.string(), "#!/bin/sh\ntouch " + (checkout_ / "ran").string() + "\nexit 1\n");
-      std::filesystem::permissions(path, std::filesystem::perms::owner_all);
+      write_program(program, "touch " + (checkout_ / "ran").string() + "\nexit 1");
     }
+  }
+
+  void write_program(const std::string& name, const std::string& script) const {
+    const auto path = programs_ / name;
+    files::write_file(path.string(), "#!/bin/sh\n" + script + "\n");
+    std::filesystem::permissions(path, std::filesystem::perms::owner_all);
   }
 
   /// Runs the copy; standard output and error together.
@@ -129,6 +134,22 @@ TEST_F(Wrapper, KnowsEveryFuzzTarget) {
   EXPECT_EQ(matches(run("fuzz", 2), "\\b([a-z_]+_fuzz)\\b"), sources);
   EXPECT_THAT(run("fuzz stroage_fuzz", 2), HasSubstr("no such fuzz target 'stroage_fuzz'"));
   EXPECT_TRUE(touched_nothing());
+}
+
+/// A suite whose output fills a pipe, with every package installed and every build successful.
+TEST_F(Wrapper, TestEndsWithTheSummaryAndTheExitCodeOfALongSuite) {
+  write_program("dpkg-query", "echo installed");
+  write_program("cmake", "exit 0");
+  std::filesystem::create_directories(checkout_ / "tests");
+  files::write_file((checkout_ / "tests" / "long.txt").string(), "A.Day 100 slow\n");
+  const std::string tests = "seq 5000 | sed 's,.*,&/5000 Test #&: Some.Test ... Passed &.00 sec,'\n";
+  write_program("ctest", tests + "echo '100% tests passed, 0 tests failed out of 5000'");
+  EXPECT_THAT(run("test"), EndsWith("5000.00 Some.Test\n4999.00 Some.Test\n4998.00 Some.Test\n4997.00 Some.Test\n"
+                                    "4996.00 Some.Test\n4995.00 Some.Test\n4994.00 Some.Test\n4993.00 Some.Test\n"
+                                    "4992.00 Some.Test\n4991.00 Some.Test\n4990.00 Some.Test\n4989.00 Some.Test\n"
+                                    "100% tests passed, 0 tests failed out of 5000\n"));
+  write_program("ctest", tests + "echo '99% tests passed, 1 tests failed out of 5000'\nexit 8");
+  EXPECT_THAT(run("test", 8), EndsWith("\n99% tests passed, 1 tests failed out of 5000\n"));
 }
 
 TEST_F(Wrapper, CommandsPageHasARowForEveryCommandAndNoOther) {
