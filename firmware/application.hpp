@@ -169,8 +169,9 @@ class Application {
     inputs.second_line = hal::second_line_trips();
     inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
+    inputs.supply_dip = board_.state.supply_low || supply_falls != 0;
     inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() ||
-                         board_.state.supply_low || supply_falls != 0 || latched_faults_.endangered() ||
+                         latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 &&
                            (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());

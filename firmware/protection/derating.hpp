@@ -67,6 +67,7 @@ struct DeratingInput {
   std::int32_t model_charge_ua = measurement::no_reading,
                model_discharge_ua = measurement::no_reading;  ///< state of function, both >= 0
   bool derate = false, charge_forbidden = false, discharge_forbidden = false;
+  bool closed = true;  ///< the contactors, for a truck or a charger
 };
 
 /// Allowed currents, both >= 0.
@@ -99,30 +100,38 @@ class Derating {
       lower(charge, plan_->charge_soc, soc_ppb + sigma_ppb);
       lower(discharge, plan_->discharge_soc, soc_ppb - sigma_ppb);
     }
-    ramp_towards(allowed_.charge_ua, plan_->charge_max_ua, charge, in.model_charge_ua, in.derate, step_us);
-    ramp_towards(allowed_.discharge_ua, plan_->discharge_max_ua, discharge, in.model_discharge_ua, in.derate, step_us);
-    if (in.charge_forbidden) allowed_.charge_ua = 0;
-    if (in.discharge_forbidden) allowed_.discharge_ua = 0;
+    permitted_.charge_ua =
+        ramp_towards(allowed_.charge_ua, plan_->charge_max_ua, charge, in.model_charge_ua, in.derate, step_us);
+    permitted_.discharge_ua = ramp_towards(allowed_.discharge_ua, plan_->discharge_max_ua, discharge,
+                                           in.model_discharge_ua, in.derate, step_us);
+    if (in.charge_forbidden) permitted_.charge_ua = 0;
+    if (in.discharge_forbidden) permitted_.discharge_ua = 0;
+    if (in.charge_forbidden || !in.closed) allowed_.charge_ua = 0;
+    if (in.discharge_forbidden || !in.closed) allowed_.discharge_ua = 0;
     return allowed_;
   }
 
+  /// What cell and faults permit now, whether or not the contactors are closed: without the bounded rate.
+  constexpr const AllowedCurrent& permitted() const { return permitted_; }
+
  private:
-  /// Moves allowed_ua towards its target. share: of most_ua, in 1/1024.
-  static constexpr void ramp_towards(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share,
-                                     std::int32_t model_ua, bool derate, std::uint32_t step_us) {
-    const auto part = [](std::int32_t ua, std::uint32_t of_2_20) {
-      return static_cast<std::int32_t>((static_cast<std::int64_t>(ua) * of_2_20) >> 20);
-    };
+  static constexpr std::int32_t part(std::int32_t ua, std::uint32_t of_2_20) {
+    return static_cast<std::int32_t>((static_cast<std::int64_t>(ua) * of_2_20) >> 20);
+  }
+  /// Moves allowed_ua towards its target, and returns the target. share: of most_ua, in 1/1024.
+  static constexpr std::int32_t ramp_towards(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share,
+                                             std::int32_t model_ua, bool derate, std::uint32_t step_us) {
     std::int32_t target_ua = part(most_ua, static_cast<std::uint32_t>(share) << 10);
     if (model_ua != measurement::no_reading) target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
     if (derate) target_ua /= 2;
     const std::int32_t down_ua =
         part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us instead of 1 s: 5 % slower
     allowed_ua = std::clamp(target_ua, allowed_ua - down_ua, allowed_ua + down_ua / rise_divisor);
+    return target_ua;
   }
 
   const DeratingPlan* plan_;
-  AllowedCurrent allowed_;
+  AllowedCurrent allowed_, permitted_;
 };
 
 }  // namespace bms::protection

@@ -50,12 +50,16 @@ enum class Fault : std::uint8_t {
   temperature_unknown,
   current_unrequested,
   allowed_current_exceeded,
+  charge_limit_exceeded,
+  discharge_limit_exceeded,
+  limit_not_obeyed,
+  supply_dip,
 };
 
 /// One bit for each fault: bit k is Fault k.
 using FaultSet = std::uint64_t;
 
-inline constexpr std::size_t fault_count = 38;
+inline constexpr std::size_t fault_count = 42;
 static_assert(fault_count <= 62, "signal Faults.FirstCause has six bits and a value for not known");
 inline constexpr std::uint8_t no_fault = 0xFF;
 
@@ -96,7 +100,11 @@ inline constexpr std::array<const char*, fault_count> fault_names = {"cell overv
                                                                      "current sensors differ",
                                                                      "temperature unknown",
                                                                      "current unrequested",
-                                                                     "allowed current exceeded"};
+                                                                     "allowed current exceeded",
+                                                                     "charge limit exceeded",
+                                                                     "discharge limit exceeded",
+                                                                     "limit not obeyed",
+                                                                     "supply dip"};
 
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
 constexpr FaultSet bit(Fault f) { return FaultSet{1} << static_cast<unsigned>(f); }

@@ -23,6 +23,7 @@
 #include "protection/balancing.hpp"
 #include "protection/contactors.hpp"
 #include "protection/derating.hpp"
+#include "protection/excess_charge.hpp"
 #include "protection/fault_monitor.hpp"
 #include "protection/pack_quantities.hpp"
 #include "protection/table.hpp"
@@ -35,6 +36,7 @@ struct ProtectionPlan {
   FaultSet derates, forbid_charge, forbid_discharge, open, open_now;
   PackLimits limits;
   DeratingPlan derating;
+  ExcessPlan excess;
   ContactorPlan contactors;
   BalancingPlan balancing;
   std::uint8_t cells;
@@ -55,6 +57,7 @@ constexpr ProtectionPlan protection_plan(const PackDesign& design) {
           .open_now = open_now,
           .limits = pack_limits(design),
           .derating = derating_plan(design),
+          .excess = excess_plan(design),
           .contactors = contactor_plan(design),
           .balancing = balancing_plan(design),
           .cells = design.cells,
@@ -84,7 +87,8 @@ struct ExternalInputs {
   bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
   bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
   bool storage_fault = false;
-  std::uint32_t second_line = 0;                             ///< trips of the front end: measurement::SecondLineTrip
+  bool supply_dip = false;        ///< the supply of the controller has fallen, perhaps only for a moment
+  std::uint32_t second_line = 0;  ///< trips of the front end: measurement::SecondLineTrip
   std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
 };
 
@@ -113,6 +117,7 @@ class Protection {
         quantities_(plan.limits),
         monitor_(plan.rules, latched),
         derating_(plan.derating),
+        excess_(plan.excess),
         contactors_(plan.contactors),
         balancing_(plan.balancing) {
     decision_.faults = monitor_.active();
@@ -130,8 +135,8 @@ class Protection {
     }
     if (!has_reading(sample)) {
       clear_ = inputs.clear;
-      return inputs.board_fault ? update_without_readings(elapsed_us(sample.time_us), 0, true)
-                                : without_sample(sample.time_us);
+      return inputs.board_fault || inputs.supply_dip ? update_without_readings(elapsed_us(sample.time_us), 0, inputs)
+                                                     : without_sample(sample.time_us);
     }
     const std::uint32_t age_us = sampled_ ? clamped(sample.time_us - sample_us_) : 0,
                         step_us = elapsed_us(sample.time_us);
@@ -144,6 +149,7 @@ class Protection {
     at(q, Quantity::storage_failed) = inputs.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
     update_current_quantities(q, sample.current_ua, inputs.second_current_ua);
+    excess_.update(sample.current_ua, decision_.allowed, permitted(), step_us, q);
     update_second_line(q);
     clear_ = inputs.clear;
     update_faults(q, step_us, inputs);
@@ -275,6 +281,7 @@ class Protection {
     at(q, Quantity::welded) = seen.welded;
     at(q, Quantity::not_closed) = seen.not_closed;
     at(q, Quantity::integrity_error) = !intact || inputs.board_fault;
+    at(q, Quantity::supply_dips) = inputs.supply_dip;
     decision_.raised = monitor_.update(q, step_us, evaluated_us_, inputs.clear, !closed_once_);
     decision_.faults = monitor_.active();
     decision_.latched = monitor_.latched();
@@ -283,7 +290,6 @@ class Protection {
 
   constexpr void update_allowed_currents(const Quantities& q, const PackEstimate<Cells>& estimate, bool no_charge,
                                          bool no_discharge, std::uint32_t step_us) {
-    const bool closed = may_drive();
     decision_.allowed = derating_.update({.highest_cell_uv = at(q, Quantity::highest_cell_uv),
                                           .lowest_cell_uv = at(q, Quantity::lowest_cell_uv),
                                           .highest_cdegc = at(q, Quantity::highest_cdegc),
@@ -293,10 +299,18 @@ class Protection {
                                           .model_charge_ua = estimate.model_charge_ua,
                                           .model_discharge_ua = estimate.model_discharge_ua,
                                           .derate = (monitor_.active() & plan_->derates) != 0,
-                                          .charge_forbidden = no_charge || !closed,
-                                          .discharge_forbidden = no_discharge || !closed},
+                                          .charge_forbidden = no_charge,
+                                          .discharge_forbidden = no_discharge,
+                                          .closed = may_drive()},
                                          step_us);
     if (recovers_) decision_.allowed.charge_ua = std::min(decision_.allowed.charge_ua, plan_->recovery_ua);
+  }
+
+  /// What cell and faults permit. A pack that recovers from a severe undervoltage is charged slowly.
+  constexpr AllowedCurrent permitted() const {
+    AllowedCurrent now = derating_.permitted();
+    if (recovers_) now.charge_ua = std::min(now.charge_ua, plan_->recovery_ua);
+    return now;
   }
 
   constexpr void switch_contactors(ContactorInput in, FaultSet faults) {
@@ -311,11 +325,11 @@ class Protection {
 
   /// A step without a sample: all quantities but the age of the last sample are unknown.
   constexpr const Decision& update_without_readings(std::uint32_t step_us, std::int32_t age_us,
-                                                    bool board_fault = false) {
+                                                    const ExternalInputs& inputs = {}) {
     Quantities q = unknown_quantities();
     at(q, Quantity::sample_age_us) = age_us;
     if (second_line_ != 0) update_second_line(q);
-    update_faults(q, step_us, {.clear = clear_, .board_fault = board_fault});
+    update_faults(q, step_us, {.clear = clear_, .board_fault = inputs.board_fault, .supply_dip = inputs.supply_dip});
     switch_contactors({.step_us = step_us}, monitor_.active());
     decision_.allowed = derating_.update({.charge_forbidden = true, .discharge_forbidden = true}, step_us);
     decision_.bleed = 0;
@@ -327,6 +341,7 @@ class Protection {
   PackQuantities<Cells> quantities_;
   FaultMonitor monitor_;
   Derating derating_;
+  ExcessCharge excess_;
   Contactors contactors_;
   Balancing<Cells> balancing_;
   Decision decision_;

@@ -55,8 +55,12 @@ enum class Quantity : std::uint8_t {
   temperatures_unknown,   ///< no sensor has a reading
   flows_unrequested,      ///< a current flows while the contactors wait for its end
   exceeds_allowed,        ///< the current is above the allowed current
+  charge_excess_us,       ///< charge above the allowed current, as time of 1C (excess_charge.hpp)
+  discharge_excess_us,
+  largest_excess_us,  ///< of both directions
+  supply_dips,        ///< 0 or 1
 };
-inline constexpr std::size_t quantity_count = 29;
+inline constexpr std::size_t quantity_count = 33;
 
 enum class Sense : std::uint8_t { above, below };
 
@@ -273,7 +277,7 @@ constexpr Table protection_table(const PackDesign& d) {
            .why = "no load that the faults above allow lasts as long"}),
       row({.fault = precharge_failed,
            .raised = {.quantity = precharge_off_curve, .sense = above, .threshold = 0, .delay_s = 0},
-           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = open_now,
            .why = "no delay: the time is in the curve; the resistor cools for ten seconds before the next attempt"}),
       row({.fault = contactor_welded,
@@ -283,7 +287,7 @@ constexpr Table protection_table(const PackDesign& d) {
            .why = "two samples at 10 Hz"}),
       row({.fault = contactor_not_closed,
            .raised = {.quantity = not_closed, .sense = above, .threshold = 0, .delay_s = 0.3},
-           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = open_now,
            .why = "a contactor closes and stops bouncing within 50 ms"}),
       row({.fault = samples_missing,
@@ -328,7 +332,7 @@ constexpr Table protection_table(const PackDesign& d) {
            .why = "at 5C a cell warms up by less than 10 K in a minute, and currents are a quarter by then"}),
       row({.fault = current_unrequested,
            .raised = {.quantity = flows_unrequested, .sense = above, .threshold = 0, .delay_s = 60},
-           .released = {.threshold = 0, .after_s = 10, .recovery = on_clear},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = open,
            .why = "a lifted load can be lowered within a minute"}),
       row({.fault = allowed_current_exceeded,
@@ -336,6 +340,26 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = warn,
            .why = "a truck reduces its current within one second; lifting a load takes seconds"}),
+      row({.fault = charge_limit_exceeded,
+           .raised = {.quantity = charge_excess_us, .sense = above, .threshold = in_micro(3.6), .delay_s = 0},
+           .released = {.threshold = in_micro(1.8), .after_s = 10, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "the integral is the delay: 0.1 % of the capacity; a truck that obeys within a second uses a third"}),
+      row({.fault = discharge_limit_exceeded,
+           .raised = {.quantity = discharge_excess_us, .sense = above, .threshold = in_micro(3.6), .delay_s = 0},
+           .released = {.threshold = in_micro(1.8), .after_s = 10, .recovery = automatic},
+           .reaction = forbid_discharge,
+           .why = "as for the charge limit"}),
+      row({.fault = limit_not_obeyed,
+           .raised = {.quantity = largest_excess_us, .sense = above, .threshold = in_micro(10.8), .delay_s = 0},
+           .released = {.threshold = in_micro(5.4), .after_s = 10, .recovery = automatic},
+           .reaction = open_now,
+           .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0"}),
+      row({.fault = supply_dip,
+           .raised = {.quantity = supply_dips, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 1, .recovery = automatic},
+           .reaction = open_now,
+           .why = "no delay: the interrupt has already opened"}),
   }};
 }
 

@@ -80,7 +80,7 @@ TEST_F(PackTest, ATripOfTheFrontEndOpensAndIsPublishedAtOnceWithItsCause) {
   EXPECT_EQ(chip.crc_errors, 65'535U);
 }
 
-TEST_F(PackTest, ADipOfTheSupplyBetweenTwoSamplesOpensUntilFaultsAreCleared) {
+TEST_F(PackTest, ADipOfTheSupplyBetweenTwoSamplesOpensUntilTheNextKeyOn) {
   std::uint8_t counter = 0;
   const auto request_s = [&](int seconds) {
     for (int k = 0; k < seconds; ++k) {
@@ -94,10 +94,11 @@ TEST_F(PackTest, ADipOfTheSupplyBetweenTwoSamplesOpensUntilFaultsAreCleared) {
   second();
   EXPECT_EQ(host_hal::supply_acknowledged, 3U);
   EXPECT_FALSE(host_hal::switched.main_plus || host_hal::switched.main_minus || host_hal::switched.precharge);
-  EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
+  EXPECT_EQ(last<can::MoreFaults>()->supply_dip, 1U);
+  EXPECT_EQ(last<can::Faults>()->first_cause, can::Faults::first_cause_supply_dip);
+  EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
   request_s(10);
   EXPECT_FALSE(driving());
-  send_command(can::Command::code_clear_faults, 0, 14);
   for (int k = 0; k < 7; ++k) second();  // the request must expire before a new one counts
   request_s(20);
   EXPECT_TRUE(driving());
@@ -112,9 +113,8 @@ TEST_F(PackTest, AnUnfitBoardClosesNothing) {
       second();
     }
   };
-  for (const auto condition :
-       {&hal::BoardState::ram_failed, &hal::BoardState::image_failed, &hal::BoardState::stack_overrun,
-        &hal::BoardState::clock_failed, &hal::BoardState::supply_low}) {
+  for (const auto condition : {&hal::BoardState::ram_failed, &hal::BoardState::image_failed,
+                               &hal::BoardState::stack_overrun, &hal::BoardState::clock_failed}) {
     host_hal::board_state = {};
     host_hal::board_state.*condition = true;
     drive_s(5);

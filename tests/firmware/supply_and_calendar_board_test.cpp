@@ -257,9 +257,9 @@ TEST_F(Supply, FallingOpensInTheInterruptStoresOneRecordAndIsPublished) {
   EXPECT_LE(record, 24U) << "plus the last record before the start once more: 0.4 ms";
   board.run_for_ms(600);
   const unsigned with_the_fault = board.flash.words_programmed;
-  EXPECT_LE(with_the_fault - written, record + 70) << "the internal fault is stored with the next sample: 1.1 ms";
+  EXPECT_LE(with_the_fault - written, record + 70) << "the fault is stored with the next sample: 1.1 ms";
   EXPECT_EQ(last<can::Board>(board)->supply_low, 1U);
-  EXPECT_EQ(last<can::Faults>(board)->internal_fault, 1U);
+  EXPECT_EQ(last<can::MoreFaults>(board)->supply_dip, 1U);
   board.supply(false);
   board.run_for_ms(1'200);
   EXPECT_EQ(last<can::Board>(board)->supply_low, 0U);

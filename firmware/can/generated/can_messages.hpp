@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: f54ca9f3bc8995a2120d503a645e718441ed35e47590c4f06a3d2032cf14cee7
+// SHA-256 of that file: cb85d5cb6a7ad572bd34e7dc44d32dbebed46705cea72b3fe7719a3a9b496b33
 #pragma once
 
 #include <array>
@@ -1340,7 +1340,7 @@ struct Faults {
   std::uint32_t internal_fault = 0;  ///< The firmware found an internal error, or the watchdog reset it.
   static constexpr SignalLayout storage_fault_layout = {47, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t storage_fault = 0;  ///< Records cannot be stored.
-  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 38.0F, true, 63};
+  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 42.0F, true, 63};
   std::uint32_t first_cause = 0;  ///< First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.
   static constexpr std::uint32_t first_cause_none = 0;
   static constexpr std::uint32_t first_cause_cell_overvoltage_warning = 1;
@@ -1381,6 +1381,10 @@ struct Faults {
   static constexpr std::uint32_t first_cause_temperature_unknown = 36;
   static constexpr std::uint32_t first_cause_current_unrequested = 37;
   static constexpr std::uint32_t first_cause_allowed_current_exceeded = 38;
+  static constexpr std::uint32_t first_cause_charge_limit_exceeded = 39;
+  static constexpr std::uint32_t first_cause_discharge_limit_exceeded = 40;
+  static constexpr std::uint32_t first_cause_limit_not_obeyed = 41;
+  static constexpr std::uint32_t first_cause_supply_dip = 42;
   static constexpr std::uint32_t first_cause_not_known = 63;
 
   constexpr can::Frame frame(std::uint8_t counter) const {
@@ -1530,7 +1534,7 @@ struct Faults {
     see("SamplesMissing", "No samples arrive.", std::span<const ValueName>());
     see("InternalFault", "The firmware found an internal error, or the watchdog reset it.", std::span<const ValueName>());
     see("StorageFault", "Records cannot be stored.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 40> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 44> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
   }
 };
 
@@ -1552,6 +1556,14 @@ struct MoreFaults {
   std::uint32_t current_unrequested = 0;  ///< A current has flowed for a minute after the request has ended.
   static constexpr SignalLayout allowed_current_exceeded_layout = {21, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t allowed_current_exceeded = 0;  ///< The current has been above AllowedCurrent for ten seconds.
+  static constexpr SignalLayout charge_limit_exceeded_layout = {22, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t charge_limit_exceeded = 0;  ///< A tenth of a percent of the capacity was charged above AllowedCurrent: charging is forbidden.
+  static constexpr SignalLayout discharge_limit_exceeded_layout = {23, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t discharge_limit_exceeded = 0;  ///< A tenth of a percent of the capacity was discharged above AllowedCurrent: discharging is forbidden.
+  static constexpr SignalLayout limit_not_obeyed_layout = {24, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t limit_not_obeyed = 0;  ///< The charge above AllowedCurrent has reached 0.3 % of the capacity: the contactors have opened.
+  static constexpr SignalLayout supply_dip_layout = {25, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t supply_dip = 0;  ///< The supply of the controller has fallen, perhaps only for a moment: the contactors have opened.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
@@ -1561,6 +1573,10 @@ struct MoreFaults {
     put<temperature_unknown_layout>(out, temperature_unknown);
     put<current_unrequested_layout>(out, current_unrequested);
     put<allowed_current_exceeded_layout>(out, allowed_current_exceeded);
+    put<charge_limit_exceeded_layout>(out, charge_limit_exceeded);
+    put<discharge_limit_exceeded_layout>(out, discharge_limit_exceeded);
+    put<limit_not_obeyed_layout>(out, limit_not_obeyed);
+    put<supply_dip_layout>(out, supply_dip);
     protect(out, data_id, counter);
     return out;
   }
@@ -1572,6 +1588,10 @@ struct MoreFaults {
     out.temperature_unknown = get<temperature_unknown_layout, decltype(out.temperature_unknown)>(frame);
     out.current_unrequested = get<current_unrequested_layout, decltype(out.current_unrequested)>(frame);
     out.allowed_current_exceeded = get<allowed_current_exceeded_layout, decltype(out.allowed_current_exceeded)>(frame);
+    out.charge_limit_exceeded = get<charge_limit_exceeded_layout, decltype(out.charge_limit_exceeded)>(frame);
+    out.discharge_limit_exceeded = get<discharge_limit_exceeded_layout, decltype(out.discharge_limit_exceeded)>(frame);
+    out.limit_not_obeyed = get<limit_not_obeyed_layout, decltype(out.limit_not_obeyed)>(frame);
+    out.supply_dip = get<supply_dip_layout, decltype(out.supply_dip)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -1583,6 +1603,10 @@ struct MoreFaults {
     see("TemperatureUnknown", "", temperature_unknown, temperature_unknown_layout);
     see("CurrentUnrequested", "", current_unrequested, current_unrequested_layout);
     see("AllowedCurrentExceeded", "", allowed_current_exceeded, allowed_current_exceeded_layout);
+    see("ChargeLimitExceeded", "", charge_limit_exceeded, charge_limit_exceeded_layout);
+    see("DischargeLimitExceeded", "", discharge_limit_exceeded, discharge_limit_exceeded_layout);
+    see("LimitNotObeyed", "", limit_not_obeyed, limit_not_obeyed_layout);
+    see("SupplyDip", "", supply_dip, supply_dip_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
@@ -1593,6 +1617,10 @@ struct MoreFaults {
     see("TemperatureUnknown", "No temperature sensor has given a reading for a minute.", std::span<const ValueName>());
     see("CurrentUnrequested", "A current has flowed for a minute after the request has ended.", std::span<const ValueName>());
     see("AllowedCurrentExceeded", "The current has been above AllowedCurrent for ten seconds.", std::span<const ValueName>());
+    see("ChargeLimitExceeded", "A tenth of a percent of the capacity was charged above AllowedCurrent: charging is forbidden.", std::span<const ValueName>());
+    see("DischargeLimitExceeded", "A tenth of a percent of the capacity was discharged above AllowedCurrent: discharging is forbidden.", std::span<const ValueName>());
+    see("LimitNotObeyed", "The charge above AllowedCurrent has reached 0.3 % of the capacity: the contactors have opened.", std::span<const ValueName>());
+    see("SupplyDip", "The supply of the controller has fallen, perhaps only for a moment: the contactors have opened.", std::span<const ValueName>());
   }
 };
 

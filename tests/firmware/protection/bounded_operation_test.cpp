@@ -23,7 +23,11 @@ TEST(CurrentWithoutRequest, OpensAfterAMinuteAndFiveSecondsOfGrace) {
   b.load_ua = 0;
   b.inputs.request = Request::drive;
   b.run(200);
-  EXPECT_FALSE(b.protection.decision().outputs.any_closed()) << "a clear command is needed";
+  EXPECT_FALSE(b.protection.decision().outputs.any_closed()) << "the key was turned before the fault had ended";
+  b.inputs.request = Request::none;
+  b.run(2);
+  EXPECT_EQ(b.protection.decision().faults, 0U);
+  b.drive_off();
 }
 
 TEST(CurrentWithoutRequest, ALoadThatIsLoweredWithinAMinuteOpensWithoutAFault) {

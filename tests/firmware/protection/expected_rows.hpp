@@ -56,9 +56,9 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"temperature lost", "TemperatureLost", '>', 0, 2'000, 0, 10'000, 'a', "derate"},
     {"temperature stuck", "TemperatureStuck", '>', 0, 10'000, 0, 60'000, 'a', "derate"},
     {"deep discharge", "DeepDischarge", '<', 1'500'000, 10'000, 1'600'000, 0, 's', "open"},
-    {"precharge failed", "PrechargeFailed", '>', 0, 0, 0, 10'000, 'c', "open now"},
+    {"precharge failed", "PrechargeFailed", '>', 0, 0, 0, 10'000, 'a', "open now"},
     {"contactor welded", "ContactorWelded", '>', 0, 200, 0, 10'000, 's', "open now"},
-    {"contactor not closed", "ContactorNotClosed", '>', 0, 300, 0, 10'000, 'c', "open now"},
+    {"contactor not closed", "ContactorNotClosed", '>', 0, 300, 0, 10'000, 'a', "open now"},
     {"samples missing", "SamplesMissing", '>', 500'000, 0, 200'000, 1'000, 'a', "open now"},
     {"internal fault", "InternalFault", '>', 0, 0, 0, 0, 'c', "open now"},
     {"storage fault", "StorageFault", '>', 0, 0, 0, 0, 'c', "warn"},
@@ -66,8 +66,13 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"second line failed", "SecondLineFailed", '>', 0, 200, 0, 10'000, 's', "open now"},
     {"current sensors differ", "CurrentSensorsDiffer", '>', 20'000'000, 2'000, 10'000'000, 10'000, 'c', "open"},
     {"temperature unknown", "TemperatureUnknown", '>', 0, 60'000, 0, 10'000, 'a', "open"},
-    {"current unrequested", "CurrentUnrequested", '>', 0, 60'000, 0, 10'000, 'c', "open"},
+    {"current unrequested", "CurrentUnrequested", '>', 0, 60'000, 0, 10'000, 'a', "open"},
     {"allowed current exceeded", "AllowedCurrentExceeded", '>', 0, 10'000, 0, 10'000, 'a', "warn"},
+    {"charge limit exceeded", "ChargeLimitExceeded", '>', 3'600'000, 0, 1'800'000, 10'000, 'a', "forbid charge"},
+    {"discharge limit exceeded", "DischargeLimitExceeded", '>', 3'600'000, 0, 1'800'000, 10'000, 'a',
+     "forbid discharge"},
+    {"limit not obeyed", "LimitNotObeyed", '>', 10'800'000, 0, 5'400'000, 10'000, 'a', "open now"},
+    {"supply dip", "SupplyDip", '>', 0, 0, 0, 1'000, 'a', "open now"},
 };
 
 }  // namespace bms::protection

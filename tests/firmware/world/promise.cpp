@@ -129,6 +129,15 @@ double Judge::value(const Row& row) const {
   return c;
 }
 
+/// Upper bound of the charge above the allowed current: against the published one, which is lower than what the cell
+/// carries while the contactors have just closed or a load is lowered. Negative for other rows.
+double Judge::most_excess_s(const Row& row) const {
+  if (begins(row.quantity, "charge above the allowed charge current")) return charge_excess_s_;
+  if (begins(row.quantity, "charge above the allowed discharge current")) return discharge_excess_s_;
+  if (begins(row.quantity, "charge above the allowed current")) return std::max(charge_excess_s_, discharge_excess_s_);
+  return -1;
+}
+
 bool Judge::judged(const Row& row) const { return !std::isnan(value(row)); }
 
 /// Of the measurement: 1 mV of a cell and its filter, 0.1 K of the front end and the thermistor's curve, half a per
@@ -169,10 +178,11 @@ void Judge::check_raised(std::uint64_t raised, double now_s) {
     bool right = false;
     double longest_s = 0, v = std::nan("");
     for (std::size_t k = 0; k < rows_.size(); ++k) {
+      if (rows_[k].bit == bit) right = right || most_excess_s(rows_[k]) > 0.8 * rows_[k].threshold;
       if (rows_[k].bit != bit || watches_[k].recent.empty()) continue;
       for (const auto& [at, perhaps] : watches_[k].recent) longest_s = std::max(longest_s, perhaps);
       v = value(rows_[k]);
-      right = longest_s > 0 && longest_s > 0.97 * rows_[k].delay_s - 0.15;
+      right = right || (longest_s > 0 && longest_s > 0.97 * rows_[k].delay_s - 0.15);
     }
     if (right) continue;
     ++falsely_;
@@ -211,6 +221,13 @@ void Judge::step() {
   double& other_s = ratio > 0 ? discharge_overload_s_ : charge_overload_s_;
   overload_s = std::max(0.0, overload_s + heating * step_s);
   other_s = std::max(0.0, other_s - step_s);
+  const double a = world_.truck.current_a(), leak_a = 0.005 * limit_a_;  // 1C is the limit
+  const auto integrate = [&](double& excess_s, double current_a, double allowed_a) {
+    const double above_a = std::max(0.0, current_a - overload_from * allowed_a);
+    excess_s = std::max(0.0, excess_s + (above_a - leak_a) / limit_a_ * step_s);
+  };
+  integrate(charge_excess_s_, a, world_.vehicle.allowed_charge_a());
+  integrate(discharge_excess_s_, -a, world_.vehicle.allowed_discharge_a());
   for (std::size_t k = 0; k < rows_.size(); ++k) watch(rows_[k], watches_[k], now_s, step_s);
   const std::uint64_t faults = world_.vehicle.faults();
   check_raised(faults & ~before_, now_s);

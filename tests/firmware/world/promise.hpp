@@ -66,6 +66,7 @@ class Judge {
   bool judged(const Row& row) const;
 
  private:
+  double most_excess_s(const Row& row) const;
   struct Watch {
     double beyond_s = 0;                           ///< surely beyond the threshold, without a break
     double perhaps_s = 0;                          ///< counts up and down
@@ -82,7 +83,8 @@ class Judge {
   TruckWorld& world_;
   std::vector<Row> rows_;
   std::vector<Watch> watches_;
-  double limit_a_, last_s_, charge_overload_s_ = 0, discharge_overload_s_ = 0, opening_since_s_ = -1;
+  double limit_a_, last_s_, charge_overload_s_ = 0, discharge_overload_s_ = 0, charge_excess_s_ = 0,
+                            discharge_excess_s_ = 0, opening_since_s_ = -1;
   std::uint64_t before_;
   unsigned missed_ = 0, falsely_ = 0;
   std::vector<std::string> findings_;

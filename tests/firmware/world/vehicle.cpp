@@ -47,7 +47,11 @@ constexpr std::array names{"cell overvoltage warning",
                            "current sensors differ",
                            "temperature unknown",
                            "current unrequested",
-                           "allowed current exceeded"};
+                           "allowed current exceeded",
+                           "charge limit exceeded",
+                           "discharge limit exceeded",
+                           "limit not obeyed",
+                           "supply dip"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
                         pack_state_id = 0x180, board_id = 0x1B9;
 constexpr double request_period_ms = 1'000;
