@@ -18,6 +18,7 @@
 #include "firmware/access.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
+#include "firmware/power_requests.hpp"
 #include "firmware/progress.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
@@ -42,7 +43,7 @@ struct WithoutVehicleProfile {
   template <class Estimator, std::size_t Cells>
   constexpr void publish(const Snapshot<Estimator, Cells>&) {}
   constexpr void receive(const can::Frame&, std::uint64_t) {}
-  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
+  constexpr ChargerState charger(std::uint64_t) const { return {}; }
 };
 
 template <class Board, class VehicleProfile = WithoutVehicleProfile>
@@ -76,7 +77,7 @@ class Application {
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = vehicle_profile_.request(requested_.active_request(pack.time_us), pack.time_us);
+    const auto request = requested_.power.active(vehicle_profile_.charger(pack.time_us), pack.time_us);
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
@@ -231,10 +232,12 @@ class Application {
   void handle_power(const can::Frame& frame, std::uint64_t now_us) {
     if (!can::intact(frame, static_cast<std::uint16_t>(frame.id))) return;
     const auto request = can::DriveRequest::of(frame);
-    if (frame.id == can::Stop::id || request.request == can::DriveRequest::request_none)
-      requested_.stop(now_us);
+    if (frame.id == can::Stop::id)
+      requested_.power.stop(now_us);
+    else if (request.request == can::DriveRequest::request_none)
+      requested_.power.withdraw(now_us);
     else if (const auto wanted = access_.drive.receive(request))
-      requested_.ask(*wanted, now_us);
+      requested_.power.ask(*wanted, now_us);
   }
 
   /// Returns false if the frame is not one of a service session.

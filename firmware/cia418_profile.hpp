@@ -18,7 +18,7 @@
 //   6070     u16   A / 16
 //   6081     u8    %; FFh: not known
 //
-// The charger's heartbeat (700h + charger) starts and ends the charge, see request().
+// The charger's heartbeat (700h + charger) starts and ends the charge: power_requests.hpp.
 //
 // firmware/can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end
 // protection: use the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s.
@@ -33,6 +33,7 @@
 #include "firmware/canopen.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/power_requests.hpp"
 #include "firmware/snapshot.hpp"
 #include "hal/accepted_frames.hpp"
 
@@ -65,13 +66,9 @@ class Cia418Profile {
     node_.receive(frame, *this);
   }
 
-  /// The request that the contactors follow. truck: what the truck requests. An operational charger requests a charge,
-  /// until its heartbeat ends or has another state. While a charger is present no drive is requested, because a truck
-  /// must not drive with its charger connected (EN 1175): if the truck requests it, the contactors open.
-  constexpr protection::Request request(protection::Request truck, std::uint64_t now_us) const {
-    if (!charger_.present(now_us)) return truck;
-    if (truck == protection::Request::drive) return protection::Request::none;
-    return charger_.operational(now_us) ? protection::Request::charge : truck;
+  /// An operational charger asks for a charge until its heartbeat ends or has another state.
+  constexpr ChargerState charger(std::uint64_t now_us) const {
+    return {charger_.present(now_us), charger_.operational(now_us)};
   }
 
   /// Object dictionary, for the SDO server.

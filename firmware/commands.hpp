@@ -3,7 +3,7 @@
 //
 // A frame with a wrong CRC, another identifier or the counter of the previous command is ignored. An invalid argument
 // is answered "refused", an unknown code "no such command", one without the authority that it needs "not authorised";
-// such a command changes nothing. A stop needs no authority, and nothing that arrives with the same sample outlives it.
+// such a command changes nothing. Request 0 needs no authority.
 #pragma once
 
 #include <algorithm>
@@ -11,6 +11,7 @@
 #include <optional>
 
 #include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
+#include "firmware/power_requests.hpp"
 #include "hal/accepted_frames.hpp"
 #include "protection/contactors.hpp"
 #include "protection/fault_monitor.hpp"
@@ -41,8 +42,6 @@ enum class Privilege : std::uint8_t {
 
 /// What the commands have requested so far.
 struct Requested {
-  static constexpr std::uint64_t request_timeout_us = 5'000'000;
-
   bool log_samples = true;
   std::uint32_t unix_time_s = 0;  ///< new time of the calendar; 0: no change
   struct CalibrationChange {
@@ -52,28 +51,8 @@ struct Requested {
   std::optional<CalibrationChange> calibration_change;  ///< reset when applied
   protection::Clear clear = protection::Clear::none;    ///< reset when applied
   std::uint8_t stored_next = 0, stored_end = 0;         ///< items of the stored data to be sent
-  protection::Request power = protection::Request::none;
-  std::uint64_t power_at_us = 0;  ///< time of the last request for power
-  bool stopped = false;           ///< with the sample of power_at_us; no other request of that sample counts
+  PowerRequests power;
 
-  constexpr void stop(std::uint64_t now_us) {
-    power = protection::Request::none;
-    power_at_us = now_us;
-    stopped = true;
-  }
-  /// Returns false if a stop arrived with the same sample.
-  constexpr bool ask(protection::Request wanted, std::uint64_t now_us) {
-    if (stopped && power_at_us == now_us) return false;
-    power = wanted;
-    power_at_us = now_us;
-    stopped = false;
-    return true;
-  }
-
-  /// Returns the request for power. It expires if the vehicle does not repeat it.
-  constexpr protection::Request active_request(std::uint64_t now_us) const {
-    return now_us - power_at_us < request_timeout_us ? power : protection::Request::none;
-  }
   /// Returns the next item to be sent, if any: one with each sample.
   constexpr std::optional<std::uint8_t> next_stored_part() {
     if (stored_next >= stored_end) return std::nullopt;
@@ -94,7 +73,7 @@ class Commands {
     if (counter >= can::counters) return std::nullopt;
     const auto command = can::Command::of(frame);
     // also with the counter of the last command: another node may have sent that one
-    if (command.code == can::Command::code_request && command.argument == 0) requested.stop(now_us);
+    if (command.code == can::Command::code_request && command.argument == 0) requested.power.withdraw(now_us);
     if (counter == last_counter_) return std::nullopt;
     last_counter_ = counter;
     can::CommandAnswer answer;
@@ -126,10 +105,10 @@ class Commands {
         return A::result_done;
       case can::Command::code_request:
         if (command.argument > static_cast<std::uint32_t>(protection::Request::charge)) return A::result_refused;
-        if (command.argument == 0) return A::result_done;  // stopped above
+        if (command.argument == 0) return A::result_done;  // withdrawn above
         if (!may(Privilege::drive)) return A::result_not_authorised;
-        return requested.ask(static_cast<protection::Request>(command.argument), now_us) ? A::result_done
-                                                                                         : A::result_refused;
+        return requested.power.ask(static_cast<protection::Request>(command.argument), now_us) ? A::result_done
+                                                                                               : A::result_refused;
       case can::Command::code_stored_data: {
         const std::uint32_t first = command.argument & 0xFF, count = command.argument >> 8;
         if (first >= stored_parts || count > stored_parts) return A::result_refused;

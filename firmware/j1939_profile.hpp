@@ -13,6 +13,7 @@
 
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/power_requests.hpp"
 #include "firmware/snapshot.hpp"
 #include "hal/can.hpp"
 #include "j1939_messages.hpp"  // generated from firmware/can/j1939_profile.dbc
@@ -123,7 +124,7 @@ class J1939Profile {
   }
 
   constexpr void receive(const can::Frame&, std::uint64_t) {}
-  constexpr protection::Request request(protection::Request truck, std::uint64_t) const { return truck; }
+  constexpr ChargerState charger(std::uint64_t) const { return {}; }
 
  private:
   template <class Message>

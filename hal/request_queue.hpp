@@ -1,7 +1,8 @@
 // Received frames that wait for the firmware, each kind in a place of its own, so that no kind can take the place of
 // another:
 //
-//   stop            one: the newest. Stop, or a request for nothing
+//   stop            one: the newest. Stop
+//   nothing         one: the newest request for nothing
 //   drive requests  48, the newest first: the newest valid one counts, so a flood can only push out older ones
 //   request         one: the newest plain request for power (Command)
 //   commands        eight, the oldest first: other commands and the frames of service sessions
@@ -66,8 +67,10 @@ class RequestQueue {
       return;
     }
     if (!can::intact(frame, static_cast<std::uint16_t>(frame.id)) || can::counter_of(frame) >= can::counters) return;
-    if (is_stop(frame))
+    if (frame.id == stop_frame_id)
       stop_.push_over_oldest(frame);
+    else if (asks_for_nothing(frame))
+      nothing_.push_over_oldest(frame);
     else if (frame.id == drive_request_frame_id)
       drive_.push_over_oldest(frame);
     else if (is_plain_request(frame))
@@ -76,10 +79,10 @@ class RequestQueue {
       commands_.push(frame);
   }
 
-  /// A stop first, then drive requests from the newest on, then the plain request, then commands.
+  /// A stop first, then a request for nothing, drive requests from the newest on, the plain request, commands.
   constexpr bool pop(can::Frame& frame) {
-    return stop_.pop_oldest(frame) || drive_.pop_newest(frame) || request_.pop_oldest(frame) ||
-           commands_.pop_oldest(frame);
+    return stop_.pop_oldest(frame) || nothing_.pop_oldest(frame) || drive_.pop_newest(frame) ||
+           request_.pop_oldest(frame) || commands_.pop_oldest(frame);
   }
   constexpr bool pop_network(can::Frame& frame) { return network_.pop_oldest(frame); }
 
@@ -91,12 +94,12 @@ class RequestQueue {
   static constexpr bool is_plain_request(const can::Frame& frame) {
     return frame.id == command_frame_id && can::get_raw(frame, 12, 8) == request_code;
   }
-  static constexpr bool is_stop(const can::Frame& frame) {
-    return frame.id == stop_frame_id || (is_plain_request(frame) && can::get_raw(frame, 20, 32) == 0) ||
+  static constexpr bool asks_for_nothing(const can::Frame& frame) {
+    return (is_plain_request(frame) && can::get_raw(frame, 20, 32) == 0) ||
            (frame.id == drive_request_frame_id && can::get_raw(frame, 12, 4) == 0);
   }
 
-  FrameRing<1> stop_, request_;
+  FrameRing<1> stop_, nothing_, request_;
   FrameRing<drive_requests> drive_;
   FrameRing<8> commands_, network_;
 };

@@ -201,6 +201,8 @@ TEST_F(AttackTest, AStopThatIsSentOnceOpensUnder90PercentOfHostileFrames) {
   std::vector<can::Frame> recorded;
   int opened = 0, closed_again = 0, slowest = 0;
   for (int trial = 0; trial < trials; ++trial) {
+    truck.queue.push(plain(can::Command::code_request, 0, static_cast<std::uint8_t>(trial)));
+    truck.sample();  // the truck asks for nothing, so that what follows is a new request
     for (int k = 0; k < 300 && !truck.is_closed(); ++k) {
       if (k % 10 == 5) {
         recorded.push_back(driver.drive());

@@ -187,7 +187,7 @@ void print_page_values() {
       "{{\n  \"example_id\": {}, \"example_data_id\": {}, \"example_counter\": 5, \"example_bytes\": \"{}\", "
       "\"example_crc_over\": \"{}\", \"example_crc\": {}{},\n  \"request_lasts_s\": {:g}, \"grace_s\": {:g}\n}}\n",
       frame.id, can::Command::data_id, data, protected_bytes, frame.data[0], entries.text(),
-      1e-6 * static_cast<double>(Requested::request_timeout_us), 1e-6 * protection::Contactors::grace_us);
+      1e-6 * static_cast<double>(PowerRequests::timeout_us), 1e-6 * protection::Contactors::grace_us);
 }
 
 }  // namespace

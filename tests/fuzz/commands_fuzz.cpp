@@ -29,15 +29,17 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const bool allowed = (data[3] & 0x20) != 0;
     const auto answer = commands.handle(frame, now_us, requested, [allowed](firmware::Privilege) { return allowed; });
     require(requested.stored_end <= firmware::stored_parts);
-    require(static_cast<unsigned>(requested.power) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
+    const auto power_at = [&requested](std::uint64_t us) {
+      return firmware::PowerRequests(requested.power).active({}, us);
+    };
+    require(static_cast<unsigned>(power_at(now_us)) <= 2 && static_cast<unsigned>(requested.clear) <= 2);
     const bool same = requested.log_samples == before.log_samples && requested.unix_time_s == before.unix_time_s &&
                       requested.clear == before.clear && requested.power == before.power &&
-                      requested.power_at_us == before.power_at_us && requested.stored_next == before.stored_next &&
-                      requested.stored_end == before.stored_end;
-    if (!answer) {  // a stop counts also if it is not answered
+                      requested.stored_next == before.stored_next && requested.stored_end == before.stored_end;
+    if (!answer) {  // request 0 counts also if it is not answered
       const auto command = can::Command::of(frame);
       require(same || (command.code == can::Command::code_request && command.argument == 0 &&
-                       requested.power == protection::Request::none));
+                       power_at(now_us) == protection::Request::none));
       continue;
     }
     require(frame.id == can::Command::id && can::intact(frame, can::Command::data_id) &&
@@ -46,11 +48,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     require(answer->code == can::Command::of(frame).code &&
             answer->command_counter == static_cast<std::uint32_t>(last_counter));
     require(same || answer->result == can::CommandAnswer::result_done);
-    if (requested.power != protection::Request::none) {
-      require(requested.active_request(requested.power_at_us + firmware::Requested::request_timeout_us - 1) ==
-              requested.power);
-      require(requested.active_request(requested.power_at_us + firmware::Requested::request_timeout_us) ==
-              protection::Request::none);
+    if (answer->code == can::Command::code_request && answer->result == can::CommandAnswer::result_done) {
+      const auto wanted = static_cast<protection::Request>(can::Command::of(frame).argument);
+      require(power_at(now_us + firmware::PowerRequests::timeout_us - 1) == wanted);
+      require(power_at(now_us + firmware::PowerRequests::timeout_us) == protection::Request::none);
     }
   }
   return 0;

@@ -65,6 +65,17 @@ TEST(RequestQueue, PassesAStopOnBeforeAllElseWhateverElseArrives) {
   }
 }
 
+/// Request 0 ends the request of the truck only, so it must not take the place of a stop.
+TEST(RequestQueue, ARequestForNothingDoesNotPushOutAStop) {
+  RequestQueue queue;
+  queue.push(frame(0x0A0, 0));
+  for (int k = 0; k < 100; ++k) queue.push(k % 2 == 0 ? command(4, 0) : frame(0x1B2, 0));
+  const auto all = drained(queue);
+  ASSERT_EQ(all.size(), 2U);
+  EXPECT_EQ(all[0].id, 0x0A0U);
+  EXPECT_EQ(all[1].id, 0x1B2U) << "the newest";
+}
+
 TEST(RequestQueue, PassesTheNewestDriveRequestOnFirstAndDropsTheOldest) {
   RequestQueue queue;
   for (std::uint64_t k = 1; k <= 100; ++k) queue.push(drive(k));

@@ -1,0 +1,81 @@
+// The one place that decides which request for power the contactors follow.
+//
+//   source    asks by                                                     asks for nothing by
+//   truck     Command request 1 or 2, DriveRequest (firmware/access.hpp)  request 0, or silence of five seconds
+//   charger   its state: Cia418Profile::charger()                         any other state, or no heartbeat
+//
+//   1. A stop (frame Stop) ends the request of every source until that source asks again: it has to ask for nothing
+//      first. A source that only goes on is not followed, nor is anything that arrives with the same sample.
+//   2. A truck does not drive while a charger is present (EN 1175): then neither is followed.
+//   3. The truck's request, then the charger's.
+//
+// Request 0 ends the request of the truck and of no other source, because a parked truck repeats it every second.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+
+#include "protection/contactors.hpp"
+
+namespace bms::firmware {
+
+/// A charger, as its profile knows it.
+struct ChargerState {
+  bool present = false;  ///< a truck must not drive
+  bool asks = false;     ///< for a charge
+};
+
+class PowerRequests {
+ public:
+  using Request = protection::Request;
+  static constexpr std::uint64_t timeout_us = 5'000'000;
+
+  constexpr void stop(std::uint64_t now_us) {
+    stopped_.fill(true);
+    refuse_until_after(now_us);
+  }
+  /// The truck asks for nothing.
+  constexpr void withdraw(std::uint64_t now_us) {
+    truck_ = Request::none;
+    stopped_[truck] = false;
+    refuse_until_after(now_us);
+  }
+  /// The truck asks and may. Returns false if a stop stands against it.
+  constexpr bool ask(Request wanted, std::uint64_t now_us) {
+    if (truck_request(now_us) == Request::none) stopped_[truck] = false;
+    if (refuses_ && refused_us_ == now_us) stopped_[truck] = true;
+    truck_ = wanted;
+    asked_us_ = now_us;
+    return !stopped_[truck];
+  }
+
+  /// The request to follow. Call with every sample.
+  constexpr Request active(const ChargerState& now, std::uint64_t now_us) {
+    if (!now.asks) stopped_[charger] = false;
+    const Request of_truck = stopped_[truck] ? Request::none : truck_request(now_us);
+    if (of_truck == Request::drive && now.present) return Request::none;
+    return of_truck == Request::none && now.asks && !stopped_[charger] ? Request::charge : of_truck;
+  }
+
+  constexpr bool operator==(const PowerRequests&) const = default;
+
+ private:
+  enum Source : std::size_t { truck, charger, sources };
+
+  /// What the truck asks for, followed or not.
+  constexpr Request truck_request(std::uint64_t now_us) const {
+    return now_us - asked_us_ < timeout_us ? truck_ : Request::none;
+  }
+  constexpr void refuse_until_after(std::uint64_t now_us) {
+    refuses_ = true;
+    refused_us_ = now_us;
+  }
+
+  std::array<bool, sources> stopped_{};  ///< by a stop, since when the source has not asked for nothing
+  Request truck_ = Request::none;
+  std::uint64_t asked_us_ = 0, refused_us_ = 0;  ///< refused_us_: nothing that arrives with this sample is followed
+  bool refuses_ = false;
+};
+
+}  // namespace bms::firmware
