@@ -219,6 +219,9 @@ class Matrix {
   static void above(std::size_t k, MatrixResult& result) {
     BoardTruck truck(k + 40, result);
     if (!truck.drive_off()) return truck.complain("does not start to drive");
+    // until the published current has risen to what the cell carries
+    for (int t = 0; of_a_limit(k) && t < 4'000; t += step_ms)
+      truck.step([&](auto& s, auto& e, auto&) { bring_about(k, 0, truck, s, e); });
     // an estimator that still searches for its state of charge rejects no voltage
     for (int t = 0; k == implausible && t < 3'600'000 && truck.flags != 0; t += step_ms) truck.step();
     if (const auto ms = reaction(
