@@ -8,7 +8,8 @@ namespace bms::world {
 namespace {
 
 constexpr std::uint64_t fault(unsigned bit) { return std::uint64_t{1} << bit; }
-constexpr std::uint64_t second_line = fault(32) | fault(28);  ///< its trip opens main plus
+constexpr std::uint64_t limits = fault(38) | fault(39) | fault(40);  ///< the reading is far above them
+constexpr std::uint64_t second_line = fault(32) | fault(28);         ///< its trip opens main plus
 
 }  // namespace
 
@@ -70,7 +71,7 @@ void add_front_end_causes(std::vector<Cause>& list) {
                   [](TruckWorld& w) { w.sensors.shunt_factor = 1e5; },
                   0.4,
                   true,
-                  fault(8) | fault(9) | fault(34) | fault(37) | fault(27) | second_line,
+                  fault(8) | fault(9) | fault(34) | fault(37) | fault(27) | limits | second_line,
                   {},
                   true});
 }
