@@ -28,6 +28,7 @@ struct ReadOptions {
   bool decimal_comma = false;       ///< also detected
   bool day_first = false;           ///< dates as 31/12/2026; otherwise 12/31/2026, if both are possible
   std::string dbc;                  ///< DBC file that describes the frames of a CAN log
+  std::string channel;              ///< the only channel of a CAN log that is read; empty: any
   std::size_t cells_in_series = 0;  ///< divides a pack voltage; 0: unknown
   bool refuse_doubtful = false;     ///< an inverted current and impossible readings are errors, not warnings
   bool keep_all = false;            ///< columns without a meaning here are kept in Recording::others

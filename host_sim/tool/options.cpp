@@ -66,6 +66,7 @@ void add_reading(CLI::App& c, files::ReadOptions& o) {
   c.add_flag("--decimal-comma", o.decimal_comma, "numbers as 3,3")->group(group);
   c.add_flag("--day-first", o.day_first, "dates as 31/12/2026")->group(group);
   c.add_option("--dbc", o.dbc, "DBC file of the frames of a CAN log")->type_name("FILE")->group(group);
+  c.add_option("--channel", o.channel, "channel of a CAN log with several: can0, 1")->type_name("NAME")->group(group);
   c.add_option("--series", o.cells_in_series, "cells in series, to get a cell's voltage from pack_voltage_v")
       ->type_name("N")
       ->check(CLI::Range(1, 1'000))

@@ -9,8 +9,10 @@
 
 #include "files/bad_input.hpp"
 #include "files/logs/dbc.hpp"
+#include "files/logs/frame_signals.hpp"
 #include "files/logs/frame_text.hpp"
 #include "files/logs/own_frames.hpp"
+#include "files/logs/paired_column.hpp"
 #include "files/logs/table_layout.hpp"
 #include "files/logs/table_reader.hpp"
 #include "files/logs/text_lines.hpp"
@@ -23,19 +25,8 @@ namespace {
 constexpr std::array frame_formats = {"candump", "battery-emulator", "asc", "gvret"};
 constexpr std::size_t sniffed_lines = 20;
 constexpr std::size_t fewest_rows = 10;
-constexpr double stale_s = 10;  ///< an older value is missing
+constexpr double largest_step_back_s = 2;  ///< of frames that are left out
 constexpr double longest_without_voltage_s = 1;
-
-/// A signal and the column that it fills.
-struct MappedSignal {
-  DbcSignal signal;
-  const DbcSignal* multiplexor = nullptr;
-  Target target;
-  Scale scale;
-  double value = std::numeric_limits<double>::quiet_NaN();
-  double received_s = 0;
-  std::size_t count = 0;
-};
 
 /// The mean of the readings that are there.
 struct MeanReading {
@@ -58,7 +49,8 @@ class FrameLog {
   FrameLog(std::string path, const ReadOptions& options) : path_(std::move(path)), options_(options) {
     std::vector<std::string> mapped = options.map;
     if (options.dbc.empty()) {
-      const std::vector<std::string> own = own_map_of(path_, is_frame_format(options.format) ? options.format : "");
+      const std::vector<std::string> own =
+          own_map_of(path_, is_frame_format(options.format) ? options.format : "", options.channel);
       if (own.empty()) {
         throw BadInput(path_, 1,
                        "a log of CAN frames, expected --dbc with the file that describes them, and --map "
@@ -70,7 +62,7 @@ class FrameLog {
     }
     dbc_name_ = own_ ? own_dbc_name : options.dbc;
     dbc_ = own_ ? own_signals() : read_dbc(options.dbc);
-    for (const std::string& text : mapped) map(text);
+    for (const std::string& text : mapped) signals_.push_back(mapped_signal(text, dbc_, dbc_name_, options));
     if (index_of(Quantity::current) == signals_.size())
       throw BadInput("--map", 1, "no signal for current_a, expected --map current_a=SIGNAL with a signal of the DBC");
   }
@@ -81,8 +73,10 @@ class FrameLog {
     std::string_view line;
     TextFrame frame;
     while (lines.next(line)) {
-      if (text.parse(line, frame)) receive(frame);
+      if (!text.parse(line, frame)) continue;
+      if (senders_.is_read(frame)) receive(frame);
     }
+    senders_.check();
     bytes = lines.bytes();
     return finish(text.format(), lines.encoding());
   }
@@ -92,38 +86,6 @@ class FrameLog {
   }
 
  private:
-  void map(const std::string& text) {
-    const std::size_t equals = text.find('=');
-    const auto target = target_of(text.substr(0, equals));
-    if (equals == std::string::npos || !target || target->quantity == Quantity::time ||
-        target->quantity == Quantity::state)
-      throw BadInput("--map", 1, in_quotes(text) + ": expected current_a=SIGNAL or another column of a recording");
-    const std::string name = text.substr(equals + 1);
-    const DbcSignal* found = nullptr;
-    for (const DbcSignal& s : dbc_) {
-      if (s.name != name && s.message + "." + s.name != name) continue;
-      if (found != nullptr)
-        throw BadInput(dbc_name_, 1, in_quotes(name) + " is in several messages, expected MESSAGE.SIGNAL");
-      found = &s;
-    }
-    if (found == nullptr) throw BadInput(dbc_name_, 1, "no signal " + in_quotes(name) + ", expected one of this file");
-    MappedSignal mapped;
-    mapped.signal = *found;
-    mapped.target = *target;
-    std::string unit = found->unit;
-    for (const std::string& stated : options_.unit) {
-      if (stated.starts_with(name_of(*target) + "=")) unit = stated.substr(stated.find('=') + 1);
-    }
-    if (const auto scale = scale_of(target->quantity, unit)) mapped.scale = *scale;
-    if (mapped.signal.multiplexed_by >= 0) {
-      const auto at = std::find_if(dbc_.begin(), dbc_.end(), [&](const DbcSignal& s) {
-        return s.id == found->id && s.long_id == found->long_id && s.multiplexor;
-      });
-      if (at != dbc_.end()) mapped.multiplexor = &*at;
-    }
-    signals_.push_back(mapped);
-  }
-
   std::size_t index_of(Quantity quantity) const {
     return static_cast<std::size_t>(std::find_if(signals_.begin(), signals_.end(),
                                                  [&](const MappedSignal& s) { return s.target.quantity == quantity; }) -
@@ -135,20 +97,17 @@ class FrameLog {
     const std::span<const std::uint8_t> data(frame.data.data(), frame.length);
     bool current = false;
     for (MappedSignal& m : signals_) {
-      if (m.signal.id != frame.id || m.signal.long_id != frame.long_id || !fits(m.signal, frame.length)) continue;
-      if (m.multiplexor != nullptr &&
-          (!fits(*m.multiplexor, frame.length) ||
-           raw_value(*m.multiplexor, data) != static_cast<std::uint64_t>(m.signal.multiplexed_by)))
-        continue;
-      m.value =
-          is_missing(m.signal, data) ? std::numeric_limits<double>::quiet_NaN() : m.scale(value_of(m.signal, data));
+      if (!is_of(m.signal, frame.id, frame.long_id) || !is_sent(m.signal, m.multiplexors, data)) continue;
+      if (!senders_.is_one(m, frame) || is_late(frame.time_s)) return;
+      const bool missing = is_missing(m.signal, data);
+      m.missing += missing ? 1 : 0;
+      m.value = missing ? std::numeric_limits<double>::quiet_NaN() : m.scale(value_of(m.signal, data));
       if (std::abs(m.value) > largest_reading) {
         throw BadInput(path_, 1,
                        fmt::format("{} = {:g} at {:g} s is impossible, expected values from -{:g} to {:g}",
                                    in_quotes(m.signal.name), m.value, frame.time_s, largest_reading, largest_reading));
       }
-      m.received_s = frame.time_s;
-      ++m.count;
+      if (!by_samples_ || m.target.quantity != Quantity::current) m.column.receive(frame.time_s, m.value);
       current = current || m.target.quantity == Quantity::current;
       voltage_ = voltage_ || m.target.quantity == Quantity::voltage || m.target.quantity == Quantity::cell_voltage;
     }
@@ -165,33 +124,23 @@ class FrameLog {
   void end_sample(const TextFrame& frame) {
     if (!ends_a_sample(frame) || mean_current_.rows == 0) return;
     if (!voltage_ && !time_s_.empty() && frame.time_s - time_s_.back() < longest_without_voltage_s) return;
-    signals_[index_of(Quantity::current)].value = mean_current_.mean();
+    MappedSignal& current = signals_[index_of(Quantity::current)];
+    current.value = mean_current_.mean();
+    current.column.receive(frame.time_s, current.value);
     add_row(frame.time_s);
     mean_current_ = {};
     voltage_ = false;
   }
 
   void add_row(double time_s) {
-    if (time_s_.empty()) columns_.resize(signals_.size());
-    if (!time_s_.empty() && time_s < time_s_.back()) {
-      throw BadInput(path_, 1,
-                     fmt::format("time goes back from {:g} s to {:g} s, expected times that do not decrease",
-                                 time_s_.back(), time_s));
-    }
     if (time_s - first_s(time_s) > longest_s)
       throw BadInput(path_, 1, fmt::format("a time of {:g} s, expected a recording of less than ten years", time_s));
     if (time_s_.size() == measurement::most_rows) {
       throw BadInput(path_, 1,
                      fmt::format("more rows, expected at most {}: split the recording", measurement::most_rows));
     }
-    const bool started = std::all_of(signals_.begin(), signals_.end(), [](const auto& m) { return m.count > 0; });
-    if (!started && time_s_.empty() && time_s - first_s(time_s) < stale_s) return;  // before the first of each signal
     time_s_.push_back(time_s);
-    for (std::size_t k = 0; k < signals_.size(); ++k) {
-      const MappedSignal& m = signals_[k];
-      const bool fresh = m.count > 0 && time_s - m.received_s <= stale_s;
-      columns_[k].push_back(fresh ? m.value : std::numeric_limits<double>::quiet_NaN());
-    }
+    for (MappedSignal& m : signals_) m.column.add_row(time_s, !by_samples_);
   }
 
   double first_s(double time_s) {
@@ -199,67 +148,58 @@ class FrameLog {
     return first_s_;
   }
 
+  /// Returns true if the time is a little before that of an earlier frame: such a frame is left out. Throws if it is
+  /// much earlier.
+  bool is_late(double time_s) {
+    if (time_s >= last_s_) {
+      last_s_ = time_s;
+      return false;
+    }
+    if (last_s_ - time_s >= largest_step_back_s) {
+      throw BadInput(
+          path_, 1,
+          fmt::format("time goes back from {:g} s to {:g} s, expected times that do not decrease", last_s_, time_s));
+    }
+    ++late_;
+    return true;
+  }
+
   measurement::Recording finish(const std::string& format, const std::string& encoding) {
     measurement::Recording r;
     r.path = path_;
     r.read_as = format + (encoding.empty() ? "" : ", " + encoding) + " with " + dbc_name_;
+    refuse_absent(signals_, path_, dbc_name_);
+    if (!options_.channel.empty()) r.read_as += ", channel " + printable(options_.channel);
     for (const MappedSignal& m : signals_) {
-      if (m.count == 0) {
-        throw BadInput(path_, 1,
-                       fmt::format("no frame with {}.{} (id {:X}), expected a log of the bus that {} describes",
-                                   m.signal.message, m.signal.name, m.signal.id, dbc_name_));
-      }
       r.read_as += fmt::format("; {} from {}.{} in {}", name_of(m.target), m.signal.message, m.signal.name,
                                m.signal.unit.empty() ? "a unit that is not stated" : m.signal.unit);
     }
+    const auto dropped = static_cast<std::ptrdiff_t>(end_columns(signals_, time_s_));
+    time_s_.erase(time_s_.begin(), time_s_.begin() + dropped);
     if (time_s_.size() < fewest_rows)
       throw BadInput(path_, 1, fmt::format("{} rows, expected {} or more", time_s_.size(), fewest_rows));
     if (time_s_.back() <= time_s_.front())
       throw BadInput(path_, 1, "all rows have the same time, expected times that increase");
+    if (!by_samples_) r.read_as += delays_text(signals_, time_s_.back() - time_s_.front());
     r.time_s = std::move(time_s_);
-    for (std::size_t k = 0; k < signals_.size(); ++k) put(r, signals_[k].target, std::move(columns_[k]));
+    for (MappedSignal& m : signals_) {
+      std::vector<double>& values = m.column.values();
+      values.erase(values.begin(), values.begin() + dropped);
+      put_column(r, m.target, std::move(values));
+    }
     const bool inverted = options_.sign == CurrentSign::discharge_positive;
     for (double& a : r.current_a.edit()) a = inverted ? -a : a;
     r.read_as += inverted ? "; a discharge is positive, inverted" : "; > 0 charges";
     complete_pack(r, options_);
     if (r.voltage_v.empty())
       throw BadInput("--map", 1, "no signal for voltage_v, expected --map voltage_v=SIGNAL, or v_1, v_2 and so on");
-    return r;
-  }
-
-  static void put(measurement::Recording& r, const Target& target, std::vector<double> values) {
-    const auto numbered = [&](std::vector<measurement::Column>& columns) {
-      if (columns.size() < target.number) columns.resize(target.number, std::vector<double>(r.rows(), std::nan("")));
-      columns[target.number - 1] = std::move(values);
-    };
-    switch (target.quantity) {
-      case Quantity::current:
-        r.current_a = std::move(values);
-        break;
-      case Quantity::voltage:
-        r.voltage_v = std::move(values);
-        break;
-      case Quantity::temperature:
-        r.temperature_c = std::move(values);
-        break;
-      case Quantity::soc_ref:
-        r.soc_ref = std::move(values);
-        break;
-      case Quantity::cell_voltage:
-        numbered(r.cell_voltage_v);
-        break;
-      case Quantity::cell_temperature:
-        numbered(r.cell_temperature_c);
-        break;
-      case Quantity::pack_voltage:
-        r.pack_voltage_v = std::move(values);
-        break;
-      case Quantity::current_ref:
-        r.current_ref_a = std::move(values);
-        break;
-      default:
-        r.voltage_ref_v = std::move(values);
+    if (!own_) warn_of_missing(signals_, r);
+    if (late_ > 0) {
+      r.warnings.push_back({"repair_time_back", fmt::format("frames whose time is a little before that of the frame "
+                                                            "above: {}; they are left out",
+                                                            late_)});
     }
+    return r;
   }
 
   std::string path_;
@@ -272,7 +212,9 @@ class FrameLog {
   std::vector<DbcSignal> dbc_;
   std::vector<MappedSignal> signals_;
   std::vector<double> time_s_;
-  std::vector<std::vector<double>> columns_;
+  std::size_t late_ = 0;
+  double last_s_ = -std::numeric_limits<double>::infinity();
+  Senders senders_{path_, options_.channel};
   double first_s_ = std::numeric_limits<double>::quiet_NaN();
 };
 

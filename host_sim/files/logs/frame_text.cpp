@@ -52,6 +52,7 @@ void split_words(std::string_view line, std::vector<std::string_view>& words) {
 
 bool FrameText::parse(std::string_view line, TextFrame& frame) {
   frame.length = 0;
+  frame.channel = {};
   if (format_ == "gvret") return parse_gvret(line, frame);
   split_words(line, words_);
   if (words_.empty()) return false;
@@ -78,6 +79,7 @@ bool FrameText::parse_dump(TextFrame& frame) {
   const auto time = number(words_[0].substr(1, words_[0].size() - 2));
   if (!time || std::isnan(*time)) return false;
   frame.time_s = *time;
+  frame.channel = is_direction(words_[1]) ? words_[1].substr(2) : words_[1];
   const std::size_t hash = words_[2].find('#');
   if (hash == std::string_view::npos) {
     if (words_.size() < 4 || !words_[3].starts_with('[') || !set_id(words_[2], 16, words_[2].size() == 8, frame))
@@ -106,20 +108,37 @@ bool FrameText::parse_asc(std::string_view line, TextFrame& frame) {
     return false;
   }
   const auto time = number(words_[0]);
-  if (!time || std::isnan(*time) || words_.size() < 6 || words_[4] != "d") return false;
+  if (!time || std::isnan(*time) || words_.size() < 6) return false;
+  const bool fd = words_[1] == "CANFD";
+  if (!fd && words_[4] != "d") return false;
   last_s_ = relative_ ? last_s_ + *time : *time;
   frame.time_s = last_s_;
   const int base = decimal_ ? 10 : 16;
-  std::string_view id = words_[2];
+  std::string_view id = words_[fd ? 4 : 2];
+  frame.channel = words_[fd ? 2 : 1];
   const bool long_id = id.ends_with('x');
   if (long_id) id.remove_suffix(1);
   std::uint32_t length = 0;
-  if (!set_id(id, base, long_id, frame) || !number_in(words_[5], 16, length) || words_.size() - 6 < length)
-    return false;
+  const std::size_t first = fd ? fd_data(length) : 6;
+  if (first == 0 || !set_id(id, base, long_id, frame)) return false;
+  if (!fd && !number_in(words_[5], 16, length)) return false;
+  if (words_.size() - first < length) return false;
   for (std::size_t k = 0; k < length; ++k) {
-    if (!add_byte(words_[6 + k], base, frame)) return false;
+    if (!add_byte(words_[first + k], base, frame)) return false;
   }
   return true;
+}
+
+/// "0.001036 CANFD 1 Rx 0c0 Name 1 0 d 32 00 00 ...": behind the identifier an optional name, two flags, the code of
+/// the length and the length. Returns the index of the first byte; 0 if the line is not such a frame.
+std::size_t FrameText::fd_data(std::uint32_t& length) const {
+  for (const std::size_t flags : {std::size_t{5}, std::size_t{6}}) {
+    if (words_.size() < flags + 4) return 0;
+    const auto is_flag = [](std::string_view word) { return word == "0" || word == "1"; };
+    if (!is_flag(words_[flags]) || !is_flag(words_[flags + 1]) || words_[flags + 2].size() != 1) continue;
+    if (number_in(words_[flags + 3], 10, length)) return flags + 4;
+  }
+  return 0;
 }
 
 bool FrameText::parse_gvret(std::string_view line, TextFrame& frame) {
@@ -140,6 +159,8 @@ bool FrameText::parse_gvret(std::string_view line, TextFrame& frame) {
       has_id = set_id(fields[k], 16, false, frame);
     } else if (columns_[k] == "extended") {
       frame.long_id = fields[k] == "true" || fields[k] == "1";
+    } else if (columns_[k] == "bus") {
+      frame.channel = fields[k];
     } else if (columns_[k] == "len") {
       if (!number_in(fields[k], 10, length)) return false;
     } else if (columns_[k] == "d1") {

@@ -110,7 +110,7 @@ bool ends_a_sample(const TextFrame& frame) {
   return frame.id == status;
 }
 
-std::vector<std::string> own_map_of(const std::string& path, const std::string& format) {
+std::vector<std::string> own_map_of(const std::string& path, const std::string& format, const std::string& channel) {
   OwnLog log;
   TextLines lines(path);
   FrameText text(format);
@@ -118,7 +118,7 @@ std::vector<std::string> own_map_of(const std::string& path, const std::string& 
   TextFrame frame;
   std::size_t frames = 0;
   while (lines.next(line)) {
-    if (!text.parse(line, frame)) continue;
+    if (!text.parse(line, frame) || (!channel.empty() && frame.channel != channel)) continue;
     log.receive(frame);
     if (++frames == foreign_frames && !log.identified()) break;
   }

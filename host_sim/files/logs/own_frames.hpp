@@ -25,7 +25,8 @@ bool ends_a_sample(const TextFrame& frame);
 
 /// Columns of a recording and the signals of the battery's own frames in a log that fill them, as lines of --map:
 /// current, temperatures, and of a pack the voltage of each cell that was read at least once. Empty if the log has no
-/// Identity frame. format: of the log, empty if unknown. Throws BadInput if the file cannot be read.
-std::vector<std::string> own_map_of(const std::string& path, const std::string& format);
+/// Identity frame. format: of the log, empty if unknown. channel: the only one that is read; empty: all. Throws
+/// BadInput if the file cannot be read.
+std::vector<std::string> own_map_of(const std::string& path, const std::string& format, const std::string& channel);
 
 }  // namespace bms::files

@@ -101,7 +101,7 @@ TEST_F(FrameLogFiles, WithValuesThatAreNotAvailableHaveMissingReadings) {
       " SG_ I : 0|16@1- (0.01,0) [-300|300] \"A\" X\n SG_ U : 16|16@1+ (1,0) [0|5000] \"mV\" X\n";
   EXPECT_DOUBLE_EQ(read(in_range, frames()).voltage_v[3], 3.3);
   EXPECT_TRUE(std::isnan(read(in_range, frames("10FF8913")).voltage_v[3])) << "5.001 V is above the range";
-  EXPECT_TRUE(std::isnan(read(in_range, frames("3176E40C")).current_a[3])) << "302.57 A, too";
+  EXPECT_THAT(refused(in_range, frames("3176E40C")), HasSubstr("no value of 'I' is in its range")) << "302.57 A";
   const std::string no_range = std::string(current_signal) + voltage_signal;
   EXPECT_TRUE(std::isnan(read(no_range, frames("10FFFFFF")).voltage_v[3])) << "all ones";
   EXPECT_TRUE(std::isnan(read(no_range, frames("0080E40C")).current_a[3])) << "the lowest number of 16 bits";
