@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "files/bad_input.hpp"
 #include "files/logs/log_formats.hpp"
 #include "files/text_file.hpp"
 
@@ -48,14 +49,25 @@ std::string field_of(const std::string& text) {
   return text.find(',') == std::string::npos ? text : "\"" + text + "\"";
 }
 
+/// A comment line for each repair that was made while reading.
+std::string repairs_of(const measurement::Recording& r) {
+  std::string lines;
+  for (const measurement::Warning& w : r.warnings) {
+    if (is_repair(w)) lines += "# repaired: " + printable(w.text) + "\n";
+  }
+  return lines;
+}
+
 }  // namespace
+
+bool is_repair(const measurement::Warning& warning) { return warning.id.starts_with("repair_"); }
 
 bool is_bdf_name(const std::string& path) { return path.ends_with(".bdf") || path.ends_with(".bdf.csv"); }
 
 void write_recording(const measurement::Recording& r, const std::string& path, bool bdf) {
   const std::vector<Written> columns = columns_of(r, bdf);
   write_file(path, [&](const Sink& sink) {
-    std::string text;
+    std::string text = bdf ? std::string{} : repairs_of(r);
     for (std::size_t c = 0; c < columns.size(); ++c) text += (c == 0 ? "" : ",") + field_of(columns[c].name);
     text += '\n';
     for (std::size_t k = 0; k < r.rows(); ++k) {

@@ -1,5 +1,6 @@
 #include "reports/json_replay.hpp"
 
+#include "files/recording_text.hpp"
 #include "reports/json_parts.hpp"
 
 namespace bms::reports {
@@ -82,6 +83,10 @@ std::string json_of(const replay::CutResult& r) {
 }
 
 std::string json_of(const measurement::Recording& r, const std::string& out) {
+  Json repairs = Json::array();
+  for (const measurement::Warning& w : r.warnings) {
+    if (files::is_repair(w)) repairs.push_back(w.text);
+  }
   return text_of({{"command", "import"},
                   {"recording", r.path},
                   {"read_as", read_as(r.read_as)},
@@ -90,6 +95,7 @@ std::string json_of(const measurement::Recording& r, const std::string& out) {
                   {"duration_s", r.duration_s()},
                   {"cells", r.cell_voltage_v.size()},
                   {"read_mb_per_second", r.read_mb_per_second},
+                  {"repairs", repairs},
                   {"warnings", warnings_of(r.warnings)}});
 }
 

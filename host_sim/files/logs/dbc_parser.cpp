@@ -17,7 +17,7 @@ namespace bms::files {
 
 namespace {
 
-constexpr std::uint32_t long_id_bit = 0x8000'0000U, most_long_id = 0x1FFF'FFFF, most_short_id = 0x7FF;
+constexpr std::uint32_t long_id_bit = 0x8000'0000U, long_id_mask = 0x1FFF'FFFF, short_id_mask = 0x7FF;
 constexpr std::uint32_t signals_without_a_message = 0xC000'0000U;  ///< VECTOR__INDEPENDENT_SIG_MSG
 constexpr std::size_t most_bytes = std::size_t{64} << 20, longest_name = 1'024;
 
@@ -116,8 +116,8 @@ class Parser {
     s.name = name("a signal");
     s.line = line_;
     s.message = message_;
-    s.id = id_ & most_long_id;
-    s.long_id = (id_ & long_id_bit) != 0 || s.id > most_short_id;
+    s.id = id_ & long_id_mask;
+    s.long_id = (id_ & long_id_bit) != 0 || s.id > short_id_mask;
     std::optional<std::uint64_t> selected_by;
     if (!in_.at(':')) multiplex(s, selected_by);
     if (!in_.sign(':')) refuse("':' behind the name of the signal");

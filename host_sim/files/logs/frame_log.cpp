@@ -13,6 +13,7 @@
 #include "files/logs/frame_text.hpp"
 #include "files/logs/own_frames.hpp"
 #include "files/logs/paired_column.hpp"
+#include "files/logs/recording_columns.hpp"
 #include "files/logs/table_layout.hpp"
 #include "files/logs/table_reader.hpp"
 #include "files/logs/text_lines.hpp"
@@ -24,8 +25,6 @@ namespace {
 
 constexpr std::array frame_formats = {"candump", "battery-emulator", "asc", "gvret"};
 constexpr std::size_t sniffed_lines = 20;
-constexpr std::size_t fewest_rows = 10;
-constexpr double largest_step_back_s = 2;  ///< of frames that are left out
 constexpr double longest_without_voltage_s = 1;
 
 /// The mean of the readings that are there.

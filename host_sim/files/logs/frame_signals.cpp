@@ -135,39 +135,4 @@ void warn_of_missing(const std::vector<MappedSignal>& signals, measurement::Reco
                                                        missing, count, in_quotes(first))});
 }
 
-void put_column(measurement::Recording& r, const Target& target, std::vector<double> values) {
-  const auto numbered = [&](std::vector<measurement::Column>& columns) {
-    if (columns.size() < target.number) columns.resize(target.number, std::vector<double>(r.rows(), std::nan("")));
-    columns[target.number - 1] = std::move(values);
-  };
-  switch (target.quantity) {
-    case Quantity::current:
-      r.current_a = std::move(values);
-      break;
-    case Quantity::voltage:
-      r.voltage_v = std::move(values);
-      break;
-    case Quantity::temperature:
-      r.temperature_c = std::move(values);
-      break;
-    case Quantity::soc_ref:
-      r.soc_ref = std::move(values);
-      break;
-    case Quantity::cell_voltage:
-      numbered(r.cell_voltage_v);
-      break;
-    case Quantity::cell_temperature:
-      numbered(r.cell_temperature_c);
-      break;
-    case Quantity::pack_voltage:
-      r.pack_voltage_v = std::move(values);
-      break;
-    case Quantity::current_ref:
-      r.current_ref_a = std::move(values);
-      break;
-    default:
-      r.voltage_ref_v = std::move(values);
-  }
-}
-
 }  // namespace bms::files

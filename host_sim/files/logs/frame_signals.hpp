@@ -69,7 +69,5 @@ void refuse_absent(const std::vector<MappedSignal>& signals, const std::string& 
 std::string delays_text(const std::vector<MappedSignal>& signals, double duration_s);
 /// Warns of values that mean "not available", except of cells and sensors that have none at all.
 void warn_of_missing(const std::vector<MappedSignal>& signals, measurement::Recording& recording);
-/// Sets the column of the recording.
-void put_column(measurement::Recording& recording, const Target& target, std::vector<double> values);
 
 }  // namespace bms::files

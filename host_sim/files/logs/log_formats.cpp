@@ -31,7 +31,7 @@ struct Names {
 constexpr std::array all_names = {
     Names{Quantity::time,
           "|test time|testtime|total time|elapsed time|realtime|absolute time|time|test|unix time|date time|datetime|"
-          "dpt time|timestamp|time stamp|date|epoch|zeit|t|runtime|"},
+          "dpt time|timestamp|time stamp|date|epoch|zeit|t|runtime|run time|"},
     Names{Quantity::current,
           "|current|i|<i>|amps|cur|curr|pack current|battery current|batt current|i batt|ibatt|ibat|i bat|strom|"},
     Names{Quantity::voltage,

@@ -55,9 +55,13 @@ class HeaderFinder {
   }
 
   std::optional<TableLayout> header(std::string_view line, std::size_t number) const {
-    TableLayout layout;
-    layout.separator = separator_of(line, options_);
-    for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
+    TableLayout layout = headings_of(line);
+    layout.long_table = long_columns(layout.headings);
+    if (layout.long_table) {
+      layout.format = log_format("csv");
+      layout.decimal_comma = options_.decimal_comma;
+      return layout;
+    }
     if (!take_maps(layout)) return std::nullopt;
     if (own_names(layout)) return finished(std::move(layout), number);
     for (const LogFormat& format : log_formats()) {
@@ -74,8 +78,7 @@ class HeaderFinder {
 
   /// How many of time, current and voltage the line seems to name, whatever their units.
   int likeness(std::string_view line) const {
-    TableLayout layout;
-    for (const std::string_view part : split(line, separator_of(line, options_))) layout.headings.emplace_back(part);
+    TableLayout layout = headings_of(line);
     int named = 0;
     for (const Quantity quantity : {Quantity::time, Quantity::current, Quantity::voltage})
       named += column_of(layout, quantity).first.empty() ? 0 : 1;
@@ -84,8 +87,7 @@ class HeaderFinder {
 
   /// Says what the line lacks as a header.
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
-    TableLayout layout;
-    for (const std::string_view part : split(line, separator_of(line, options_))) layout.headings.emplace_back(part);
+    TableLayout layout = headings_of(line);
     for (const auto& [target, column] : maps_) {
       if (heading_named(layout, column)) continue;
       throw BadInput(path_, number,
@@ -110,6 +112,15 @@ class HeaderFinder {
   }
 
  private:
+  /// The headings of a line. Separators at its end are no columns.
+  TableLayout headings_of(std::string_view line) const {
+    TableLayout layout;
+    layout.separator = separator_of(line, options_);
+    for (const std::string_view part : split(line, layout.separator)) layout.headings.emplace_back(part);
+    while (layout.headings.size() > 1 && layout.headings.back().empty()) layout.headings.pop_back();
+    return layout;
+  }
+
   /// Throws if the unit of this heading is not known.
   void refuse_unit(const TableLayout& layout, const std::string& text, const Target& target, std::size_t number) const {
     const Heading heading = heading_of(text);
@@ -267,6 +278,7 @@ class HeaderFinder {
       }
       if (best >= 0) add(layout, at, {quantity, 0});
     }
+    if (!has(layout, {Quantity::time, 0})) detect_step_time(layout);
     for (const Quantity quantity : {Quantity::cell_voltage, Quantity::cell_temperature}) {
       for (std::size_t k = 0; k < layout.headings.size(); ++k) {
         const Heading heading = heading_of(layout.headings[k]);
@@ -277,6 +289,21 @@ class HeaderFinder {
     }
     if (layout.count(Quantity::cell_voltage) == 0)
       std::erase_if(layout.columns, [](const auto& c) { return c.target.quantity == Quantity::cell_temperature; });
+  }
+
+  /// The time within a step, of a table that also has the number of the step.
+  void detect_step_time(TableLayout& layout) const {
+    const auto named = [&](std::string_view names) -> std::optional<std::size_t> {
+      for (std::size_t k = 0; k < layout.headings.size(); ++k) {
+        const std::string base = heading_of(layout.headings[k]).base;
+        if (!base.empty() && names.find("|" + base + "|") != std::string_view::npos && !uses(layout, k)) return k;
+      }
+      return std::nullopt;
+    };
+    const auto time = named("|step time|steptime|"), step = named("|step|step index|step id|step number|step no|");
+    if (!time || !step || !unit_known(layout, Quantity::time, heading_of(layout.headings[*time]))) return;
+    add(layout, *time, {Quantity::time, 0});
+    layout.step = step;
   }
 
   bool complete(const TableLayout& layout) const {
@@ -325,30 +352,6 @@ std::size_t TableLayout::count(Quantity quantity) const {
   return static_cast<std::size_t>(std::count_if(columns.begin(), columns.end(),
                                                 [&](const SourceColumn& c) { return c.target.quantity == quantity; }));
 }
-
-namespace {
-
-/// Headings with the units of the row below, as one line: "Time" and "s" are "Time (s)". Empty if the row has no units.
-/// above: the row above the headings, whose first field may name the time of all devices in the headings.
-std::string with_units(std::string_view above, std::string_view headings, std::string_view units, char separator) {
-  std::vector<std::string_view> names = split(headings, separator);
-  const std::vector<std::string_view> below = split(units, separator), first = split(above, separator);
-  if (names.size() != below.size()) return {};
-  const bool dated = rank_of(Quantity::time, heading_of(first[0]).base) >= 0 && first.size() == names.size();
-  if (dated) names[0] = first[0];
-  std::string line;
-  bool time = dated;
-  for (std::size_t k = 0; k < names.size(); ++k) {
-    const bool number = std::any_of(below[k].begin(), below[k].end(), [](char c) { return c >= '0' && c <= '9'; });
-    if (number) return {};
-    time = time || scale_of(Quantity::time, below[k]);
-    if (k > 0) line += separator;
-    line += std::string(names[k]) + (below[k].empty() ? "" : " (" + std::string(below[k]) + ")");
-  }
-  return time ? line : std::string{};
-}
-
-}  // namespace
 
 TableLayout find_header(TextLines& lines, const std::string& path, bool voltage, const ReadOptions& options) {
   const HeaderFinder finder(path, voltage, options);

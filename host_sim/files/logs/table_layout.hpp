@@ -1,6 +1,7 @@
 // Where the columns of a table are: its header line, separator, units and sign. Detected, or as the user named them.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -21,6 +22,11 @@ struct SourceColumn {
   bool clock = false;  ///< times as h:mm:ss
 };
 
+/// Columns of a table that has one reading a row: whose, what and when. Indices in the file.
+struct LongColumns {
+  std::size_t entity = 0, state = 0, time = 0;
+};
+
 struct TableLayout {
   const LogFormat* format = nullptr;
   bool own = false;  ///< the project's own names, so nothing was detected
@@ -29,6 +35,9 @@ struct TableLayout {
   std::vector<SourceColumn> columns;  ///< ascending by index
   std::vector<std::string> headings;  ///< of all columns
   std::vector<std::size_t> unused;    ///< indices of columns that are not used
+  std::optional<std::size_t> day;     ///< index of the column with the date, if the time column has none
+  std::optional<std::size_t> step;    ///< index of the number of the step, if times begin again with each
+  std::optional<LongColumns> long_table;
 
   const SourceColumn* find(Quantity quantity) const;
   std::size_t count(Quantity quantity) const;
@@ -44,6 +53,13 @@ bool settle(TableLayout& layout, std::string_view line, const std::string& path,
 
 /// "table, ';' separated, decimal comma; time 'Zeit [s]' in s; ...": one line for the user.
 std::string text_of(const TableLayout& layout, const ReadOptions& options, const std::string& encoding);
+
+/// Headings with the units of the row below, as one line: "Time" and "s" are "Time (s)". Empty if the row has no units.
+/// above: the row above the headings, whose first field may name the time of all devices in the headings.
+std::string with_units(std::string_view above, std::string_view headings, std::string_view units, char separator);
+
+/// The columns of a table with one reading a row, as Home Assistant writes it; nothing for another header.
+std::optional<LongColumns> long_columns(const std::vector<std::string>& headings);
 
 /// Splits a line at the separator, also if it has quotes. The parts are trimmed and without quotes.
 std::vector<std::string_view> split(std::string_view line, char separator);

@@ -8,9 +8,12 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/logs/long_table.hpp"
+#include "files/logs/missing_reading.hpp"
 #include "files/logs/number.hpp"
+#include "files/logs/recording_columns.hpp"
+#include "files/logs/row_times.hpp"
 #include "files/logs/table_layout.hpp"
-#include "files/logs/time_text.hpp"
 #include "measurement/recording_checks.hpp"
 
 namespace bms::files {
@@ -19,10 +22,8 @@ using measurement::Recording;
 
 namespace {
 
-constexpr std::size_t minimum_rows = 10;
 constexpr double first_epoch_ms = 9e11;  ///< no log in seconds begins there
 constexpr std::size_t most_ignored_named = 10;
-const double missing_value = std::numeric_limits<double>::quiet_NaN();
 
 /// One column, in the order of the file.
 struct FileColumn {
@@ -44,12 +45,16 @@ class TableReader {
 
   Recording read(VoltageColumn voltage) {
     layout_ = find_header(lines_, recording_.path, voltage == VoltageColumn::required, options_);
+    if (layout_.long_table) return read_long_table(lines_, layout_, recording_.path, options_);
     assign_columns();
     bool first = true;
     while (next_line()) {
       if (first) {
         first = false;
-        if (settle(layout_, line_, recording_.path, lines_.number(), options_)) continue;
+        const bool units = settle(layout_, line_, recording_.path, lines_.number(), options_);
+        name_unused();
+        begin_times();
+        if (units) continue;
         point_ = layout_.decimal_comma ? ',' : '.';
         reserve();
       }
@@ -77,40 +82,10 @@ class TableReader {
     return false;
   }
 
-  measurement::Column& column_of(const Target& target) {
-    Recording& r = recording_;
-    const auto numbered = [&](std::vector<measurement::Column>& columns) -> measurement::Column& {
-      if (columns.size() < target.number) columns.resize(target.number);
-      return columns[target.number - 1];
-    };
-    switch (target.quantity) {
-      case Quantity::time:
-        return r.time_s;
-      case Quantity::current:
-        return r.current_a;
-      case Quantity::voltage:
-        return r.voltage_v;
-      case Quantity::temperature:
-        return r.temperature_c;
-      case Quantity::soc_ref:
-        return r.soc_ref;
-      case Quantity::current_ref:
-        return r.current_ref_a;
-      case Quantity::voltage_ref:
-        return r.voltage_ref_v;
-      case Quantity::cell_voltage:
-        return numbered(r.cell_voltage_v);
-      case Quantity::cell_temperature:
-        return numbered(r.cell_temperature_c);
-      default:
-        return r.pack_voltage_v;
-    }
-  }
-
   void assign_columns() {
     columns_.resize(layout_.headings.size());
     for (const SourceColumn& source : layout_.columns) {  // first all columns, because a list of them may move
-      if (source.target.quantity != Quantity::state) column_of(source.target).edit();
+      if (source.target.quantity != Quantity::state) column_of(recording_, source.target).edit();
     }
     for (const SourceColumn& source : layout_.columns) {
       FileColumn& column = columns_[source.index];
@@ -121,7 +96,7 @@ class TableReader {
       if (source.target.quantity == Quantity::state)
         state_index_ = source.index;
       else
-        column.into = &column_of(source.target).edit();
+        column.into = &column_of(recording_, source.target).edit();
       last_used_ = std::max(last_used_, source.index);
     }
     for (const auto* list : {&recording_.cell_voltage_v, &recording_.cell_temperature_c}) {
@@ -131,7 +106,15 @@ class TableReader {
                "numbers from 1 on without a gap");
       }
     }
-    name_unused();
+  }
+
+  void begin_times() {
+    const SourceColumn& time = *layout_.find(Quantity::time);
+    times_.begin({.clock = time.clock,
+                  .dated = layout_.day.has_value(),
+                  .by_step = layout_.step.has_value(),
+                  .day_first = options_.day_first});
+    for (const auto& index : {layout_.day, layout_.step}) last_used_ = std::max(last_used_, index.value_or(0));
   }
 
   /// What bms simulate writes in addition to soc_ref, and no command needs.
@@ -145,13 +128,14 @@ class TableReader {
       for (std::size_t k = 0; k < layout_.unused.size(); ++k) {
         recording_.others[k].name = layout_.headings[layout_.unused[k]];
         columns_[layout_.unused[k]].text = &recording_.others[k].text;
-        last_used_ = std::max(last_used_, layout_.unused[k]);
+        last_kept_ = std::max(last_kept_, layout_.unused[k]);
       }
       return;
     }
     std::vector<std::string> unused;
     for (const std::size_t k : layout_.unused) {
-      if (!is_known_copy(layout_.headings[k])) unused.push_back(layout_.headings[k]);
+      if (!is_known_copy(layout_.headings[k]) && k != layout_.day && k != layout_.step)
+        unused.push_back(layout_.headings[k]);
     }
     std::string ignored;
     for (std::size_t k = 0; k < std::min(most_ignored_named, unused.size()); ++k)
@@ -173,7 +157,8 @@ class TableReader {
     bool truncated = fields.size() < columns_.size() && fields.size() <= last_used_;
     for (const SourceColumn& source : layout_.columns) {
       if (source.index + 1 != fields.size() || columns_[source.index].into == nullptr || source.clock) continue;
-      truncated = truncated || (!fields.back().empty() && !number(fields.back(), point_));
+      truncated =
+          truncated || (!fields.back().empty() && !number(fields.back(), point_) && !is_missing_word(fields.back()));
     }
     if (truncated) {
       recording_.warnings.push_back(
@@ -185,29 +170,35 @@ class TableReader {
   void row() {
     if (line_.find('"') != std::string_view::npos) return quoted_row();
     std::string_view fields = line_;
-    const std::size_t needed = layout_.own ? columns_.size() : last_used_ + 1;
-    for (std::size_t k = 0; k < needed; ++k) {
+    const std::size_t needed = layout_.own ? columns_.size() : last_used_ + 1, taken = std::max(needed, last_kept_ + 1);
+    for (std::size_t k = 0; k < taken; ++k) {
       const char* const found = static_cast<const char*>(std::memchr(fields.data(), layout_.separator, fields.size()));
-      const bool last = k + 1 == needed;
-      if (found == nullptr && !last) too_few(k + 1);
-      if (found != nullptr && last && layout_.own &&
-          !trimmed({found + 1, fields.data() + fields.size()}).empty()) {  // a separator at the end is harmless
+      const bool last = k + 1 == taken;
+      if (found == nullptr && k + 1 < needed) too_few(k + 1);
+      if (found != nullptr && last && layout_.own && !is_empty_end({found + 1, fields.data() + fields.size()}))
         refuse("more fields than the header has", fmt::format("{}", columns_.size()));
-      }
       const std::size_t length = found == nullptr ? fields.size() : static_cast<std::size_t>(found - fields.data());
       take(k, fields.substr(0, length));
-      if (!last) fields.remove_prefix(length + 1);
+      if (!last) fields.remove_prefix(std::min(length + 1, fields.size()));
     }
     end_row();
   }
 
+  /// Separators at the end of a line are harmless.
+  bool is_empty_end(std::string_view rest) const {
+    return std::all_of(rest.begin(), rest.end(),
+                       [&](char c) { return c == layout_.separator || c == ' ' || c == '\t' || c == '\r'; });
+  }
+
   void quoted_row() {
     const std::vector<std::string_view> fields = split(line_, layout_.separator);
-    const std::size_t needed = layout_.own ? columns_.size() : last_used_ + 1;
+    const std::size_t needed = layout_.own ? columns_.size() : last_used_ + 1, taken = std::max(needed, last_kept_ + 1);
     if (fields.size() < needed) too_few(fields.size());
-    if (fields.size() > columns_.size() + 1 || (fields.size() > columns_.size() && !fields.back().empty()))
-      refuse("more fields than the header has", fmt::format("{}", columns_.size()));
-    for (std::size_t k = 0; k < needed; ++k) take(k, fields[k]);
+    const bool longer =
+        std::any_of(fields.begin() + static_cast<std::ptrdiff_t>(std::min(fields.size(), columns_.size())),
+                    fields.end(), [](std::string_view field) { return !field.empty(); });
+    if (longer) refuse("more fields than the header has", fmt::format("{}", columns_.size()));
+    for (std::size_t k = 0; k < taken; ++k) take(k, k < fields.size() ? fields[k] : std::string_view{});
     end_row();
   }
 
@@ -217,6 +208,9 @@ class TableReader {
 
   void take(std::size_t k, std::string_view field) {
     FileColumn& column = columns_[k];
+    if (k == layout_.day && !times_.set_day(field))
+      refuse(fmt::format("{} in column '{}' is not a date", in_quotes(field), layout_.headings[k]), "a date");
+    if (k == layout_.step) times_.set_step(field);
     if (column.into != nullptr)
       column.into->push_back(column.source->target.quantity == Quantity::time ? time(field, column)
                                                                               : value(field, column));
@@ -227,28 +221,48 @@ class TableReader {
   }
 
   void end_row() {
-    const measurement::Column& t = recording_.time_s;
-    if (std::isnan(t.back())) refuse("time_s is not a number", "a time in seconds");
-    if (t.size() > 1 && t.back() < t[t.size() - 2])
-      refuse(fmt::format("time goes back from {:g} s to {:g} s", t[t.size() - 2], t.back()),
-             "times that do not decrease");
-    if (std::abs(t.back() - t.front()) > longest_s)
-      refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
+    std::vector<double>& t = recording_.time_s.edit();
+    if (!std::isfinite(t.back())) refuse("time_s is not a number", "a time in seconds");
     if (state_index_ < columns_.size() && discharges_) {
       std::vector<double>& current = recording_.current_a.edit();
       current.back() = -std::abs(current.back());
     }
+    switch (times_.place(t.back(), lines_.number())) {
+      case RowTimes::Place::left_out:
+        return drop_row();
+      case RowTimes::Place::back:
+        refuse_back(times_.last_s(), t.back());
+      default:
+        break;
+    }
+    if (std::abs(t.back() - t.front()) > longest_s)
+      refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
+    if (t.size() < 2 || t.back() != t[t.size() - 2] || !repeats_the_row_above()) return;
+    times_.note_repeated(lines_.number());
+    drop_row();
+  }
+
+  [[noreturn]] void refuse_back(double from_s, double to_s) const {
+    refuse(fmt::format("time goes back from {:g} s to {:g} s", from_s, to_s), "times that do not decrease");
+  }
+  void drop_row() {
+    for (FileColumn& c : columns_) {
+      if (c.into != nullptr) c.into->pop_back();
+      if (c.text != nullptr) c.text->pop_back();
+    }
+  }
+  bool repeats_the_row_above() const {
+    return std::all_of(columns_.begin(), columns_.end(), [](const FileColumn& c) {
+      const auto same = [](const auto& list) { return list.back() == list[list.size() - 2]; };
+      if (c.text != nullptr) return same(*c.text);
+      if (c.into == nullptr) return true;
+      return same(*c.into) || (std::isnan(c.into->back()) && std::isnan((*c.into)[c.into->size() - 2]));
+    });
   }
 
   double time(std::string_view field, const FileColumn& column) {
     if (column.source->clock) {
-      const std::string_view text = trimmed(field);
-      auto s = clock_s(text);
-      if (!s) {
-        s = date_s(text, options_.day_first);
-        if (s && !epoch_s_) epoch_s_ = *s;
-        if (s) s = *s - *epoch_s_;
-      }
+      const auto s = times_.clock(field);
       if (!s)
         refuse(fmt::format("{} in column '{}' is not a time", in_quotes(field), column.name), "h:mm:ss or a date");
       return *s;
@@ -260,12 +274,16 @@ class TableReader {
 
   double value(std::string_view field, FileColumn& column) {
     auto v = number(field, point_);
-    if (!v && trimmed(field).empty()) {
-      ++column.empty;
+    if (!v && (trimmed(field).empty() || is_missing_word(trimmed(field)))) {
+      ++(trimmed(field).empty() ? column.empty : words_);
       v = missing_value;
     }
     if (!v)
       refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), column.name), "a number or nothing");
+    if (is_overflow(*v)) {
+      if (overflows_++ == 0) first_overflow_line_ = lines_.number();
+      v = missing_value;
+    }
     if (std::abs(*v) > largest_reading) {
       refuse(fmt::format("{} in column '{}' is impossible", in_quotes(field), column.name),
              fmt::format("a value from -{:g} to {:g}, or nan", largest_reading, largest_reading));
@@ -287,10 +305,18 @@ class TableReader {
       empty += c.empty;
       if (first_line == 0 || c.first_missing_line < first_line) first_line = c.first_missing_line;
     }
-    if (missing == 0) return;
+    if (overflows_ > 0) {
+      recording_.warnings.push_back(
+          {"repair_overflow", fmt::format("readings of 3.4e38, the overflow of a tester: {}, the first in line "
+                                          "{}; they are treated as missing",
+                                          overflows_, first_overflow_line_)});
+    }
+    if (missing <= overflows_) return;
+    std::string what = empty == 0 ? "'nan'" : "empty or 'nan'";
+    if (words_ > 0) what = "empty or a word such as 'unavailable'";
     recording_.warnings.push_back(
         {"missing_reading", fmt::format("readings that are {}: {}, the first in line {}; they are treated as missing",
-                                        empty == 0 ? "'nan'" : "empty or 'nan'", missing, first_line)});
+                                        what, missing - overflows_, first_line)});
   }
   static bool numbered(const FileColumn& c) {
     if (c.source == nullptr) return false;
@@ -300,9 +326,13 @@ class TableReader {
 
   void finish() {
     Recording& r = recording_;
-    if (r.rows() < minimum_rows) refuse(fmt::format("{} rows", r.rows()), fmt::format("{} or more", minimum_rows));
-    if (r.duration_s() <= 0) refuse("all rows have the same time", "times that increase");
+    const bool still = r.rows() > 0 && r.duration_s() <= 0;
+    if (still && r.rows() + times_.repeated() >= fewest_rows)
+      refuse("all rows have the same time", "times that increase");
+    if (r.rows() < fewest_rows) refuse(fmt::format("{} rows", r.rows()), fmt::format("{} or more", fewest_rows));
+    if (times_.are_many_left_out(r.rows())) refuse("time goes back in many rows", "times that do not decrease");
     warn_of_missing();
+    times_.warn(r);
     if (r.time_s.front() > first_epoch_ms && options_.refuse_doubtful) {
       throw BadInput(r.path, 1, "the times look like milliseconds since 1970, expected seconds: --unit time_s=ms");
     }
@@ -325,59 +355,16 @@ class TableReader {
   std::vector<FileColumn> columns_;
   std::size_t last_used_ = 0, state_index_ = std::numeric_limits<std::size_t>::max();
   bool discharges_ = false;
-  std::optional<double> epoch_s_;
+  std::size_t last_kept_ = 0;  ///< column that is only kept
+  std::size_t words_ = 0, overflows_ = 0, first_overflow_line_ = 0;
+  RowTimes times_;
   Recording recording_;
 };
-
-/// Mean of the readings in each row that are there.
-measurement::Column mean_of(const std::vector<measurement::Column>& columns) {
-  std::vector<double> mean(columns.front().size());
-  for (std::size_t k = 0; k < mean.size(); ++k) {
-    double sum = 0;
-    int count = 0;
-    for (const measurement::Column& column : columns) {
-      if (std::isnan(column[k])) continue;
-      sum += column[k];
-      ++count;
-    }
-    mean[k] = count > 0 ? sum / count : missing_value;
-  }
-  return mean;
-}
 
 }  // namespace
 
 Recording read_table(TextLines& lines, const std::string& path, VoltageColumn voltage, const ReadOptions& options) {
   return TableReader(lines, path, options).read(voltage);
-}
-
-namespace {
-
-bool has_no_reading(const measurement::Column& c) {
-  return std::all_of(c.begin(), c.end(), [](double v) { return std::isnan(v); });
-}
-
-/// Removes the last columns that have no reading: a log may have columns for more cells than the pack.
-void drop_absent(std::vector<measurement::Column>& columns) {
-  while (!columns.empty() && has_no_reading(columns.back())) columns.pop_back();
-}
-
-}  // namespace
-
-void complete_pack(Recording& r, const ReadOptions& options) {
-  drop_absent(r.cell_voltage_v);
-  drop_absent(r.cell_temperature_c);
-  if (!r.pack_voltage_v.empty() && has_no_reading(r.pack_voltage_v)) r.pack_voltage_v = measurement::Column{};
-  if (!r.cell_temperature_c.empty() && r.temperature_c.empty()) r.temperature_c = mean_of(r.cell_temperature_c);
-  if (!r.voltage_v.empty()) return;
-  if (!r.cell_voltage_v.empty()) {
-    r.voltage_v = mean_of(r.cell_voltage_v);
-  } else if (!r.pack_voltage_v.empty()) {
-    if (options.cells_in_series == 0)
-      throw BadInput(r.path, 1, "a pack voltage, but no voltage of a cell, expected --series with the number of cells");
-    r.voltage_v = r.pack_voltage_v;
-    for (double& v : r.voltage_v.edit()) v /= static_cast<double>(options.cells_in_series);
-  }
 }
 
 std::size_t expected_rows(std::size_t bytes, std::size_t line_length) {

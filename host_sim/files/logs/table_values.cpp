@@ -35,6 +35,17 @@ const char* epoch_unit(std::string_view text) {
   return within(1e6) ? "us" : nullptr;
 }
 
+/// The column with the date of times of day: it is called so, and its first value is a date.
+std::optional<std::size_t> day_column(const TableLayout& layout, const std::vector<std::string_view>& fields,
+                                      bool day_first) {
+  constexpr std::string_view names = "|date|datum|day|";
+  for (const std::size_t k : layout.unused) {
+    const bool named = names.find("|" + normalised(layout.headings[k]) + "|") != std::string_view::npos;
+    if (named && k < fields.size() && day_of_text_s(fields[k], day_first)) return k;
+  }
+  return std::nullopt;
+}
+
 std::string separator_name(char separator) {
   if (separator == '\t') return "tab";
   return fmt::format("'{}'", separator);
@@ -108,6 +119,7 @@ bool settle(TableLayout& layout, std::string_view line, const std::string& path,
       layout.decimal_comma = true;
   }
   time = layout.find(Quantity::time);
+  if (clock_s(field(*time)) && !layout.step) layout.day = day_column(layout, fields, options.day_first);
   const bool has_unit = !time->unit.empty() || target_of(time->heading).has_value();
   if (!has_unit && !time->clock && epoch_unit(field(*time))) {
     SourceColumn& column = *std::find_if(layout.columns.begin(), layout.columns.end(),
@@ -127,10 +139,44 @@ bool settle(TableLayout& layout, std::string_view line, const std::string& path,
   return false;
 }
 
+std::string with_units(std::string_view above, std::string_view headings, std::string_view units, char separator) {
+  std::vector<std::string_view> names = split(headings, separator);
+  const std::vector<std::string_view> below = split(units, separator), first = split(above, separator);
+  if (names.size() != below.size()) return {};
+  const bool dated = rank_of(Quantity::time, heading_of(first[0]).base) >= 0 && first.size() == names.size();
+  if (dated) names[0] = first[0];
+  std::string line;
+  bool time = dated;
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const bool number = std::any_of(below[k].begin(), below[k].end(), [](char c) { return c >= '0' && c <= '9'; });
+    if (number) return {};
+    time = time || scale_of(Quantity::time, below[k]);
+    if (k > 0) line += separator;
+    line += std::string(names[k]) + (below[k].empty() ? "" : " (" + std::string(below[k]) + ")");
+  }
+  return time ? line : std::string{};
+}
+
+std::optional<LongColumns> long_columns(const std::vector<std::string>& headings) {
+  const auto named = [&](std::string_view names) -> std::optional<std::size_t> {
+    for (std::size_t k = 0; k < headings.size(); ++k) {
+      const std::string name = normalised(headings[k]);
+      if (!name.empty() && names.find("|" + name + "|") != std::string_view::npos) return k;
+    }
+    return std::nullopt;
+  };
+  const auto entity = named("|entity id|entity|"), state = named("|state|value|"),
+             time = named("|last changed|last updated|time|timestamp|");
+  if (!entity || !state || !time) return std::nullopt;
+  return LongColumns{*entity, *state, *time};
+}
+
 std::string text_of(const TableLayout& layout, const ReadOptions& options, const std::string& encoding) {
   std::string text(layout.format->title);
   if (!encoding.empty()) text += ", " + encoding;
   text += ", " + separator_name(layout.separator) + " separated";
+  if (layout.day) text += "; date from " + in_quotes(layout.headings[*layout.day]);
+  if (layout.step) text += "; steps by " + in_quotes(layout.headings[*layout.step]) + ", one after the other";
   if (layout.decimal_comma) text += ", decimal comma";
   constexpr std::size_t most_named = 12;
   for (std::size_t k = 0; k < std::min(most_named, layout.columns.size()); ++k)

@@ -7,6 +7,8 @@ namespace bms::files {
 
 namespace {
 
+constexpr double seconds_a_day = 86'400;
+
 /// Reads a text from its beginning.
 class Cursor {
  public:
@@ -91,6 +93,14 @@ std::optional<double> days_of_text(Cursor& c, bool day_first) {
   return day_leads ? days_of(third, second, first) : days_of(third, first, second);
 }
 
+/// The time of day with "AM" or "PM" behind it, or with nothing. Nothing for another text.
+std::optional<double> half_day_s(double s, std::string_view rest) {
+  if (rest.empty()) return s;
+  const bool morning = rest == "AM" || rest == "am", afternoon = rest == "PM" || rest == "pm";
+  if (!morning && !afternoon) return std::nullopt;
+  return std::fmod(s, seconds_a_day / 2) + (afternoon ? seconds_a_day / 2 : 0);
+}
+
 /// Seconds to subtract: "Z", "+02:00", "-0500", or nothing.
 std::optional<double> zone_s(Cursor& c) {
   char sign = 0;
@@ -119,8 +129,16 @@ std::optional<double> clock_s(std::string_view text) {
     all = c;
   }
   const auto s = time_of_day(all, true);
-  if (!s || !all.ended()) return std::nullopt;
-  return days_s + *s;
+  if (!s) return std::nullopt;
+  all.spaces();
+  const auto in_day = half_day_s(*s, all.rest());
+  return in_day ? std::optional(days_s + *in_day) : std::nullopt;
+}
+
+std::optional<double> day_of_text_s(std::string_view text, bool day_first) {
+  Cursor c(text);
+  const auto days = days_of_text(c, day_first);
+  return days && c.ended() ? std::optional(*days * seconds_a_day) : std::nullopt;
 }
 
 std::optional<double> date_s(std::string_view text, bool day_first) {
@@ -131,16 +149,10 @@ std::optional<double> date_s(std::string_view text, bool day_first) {
   auto s = time_of_day(c, false);
   if (!s) return std::nullopt;
   c.spaces();
-  if (c.rest().starts_with("AM") || c.rest().starts_with("PM") || c.rest().starts_with("am") ||
-      c.rest().starts_with("pm")) {
-    const bool afternoon = c.rest()[0] == 'P' || c.rest()[0] == 'p';
-    if (*s >= 43'200) *s -= 43'200;
-    if (afternoon) *s += 43'200;
-    return c.rest().size() == 2 ? std::optional(*days * 86'400 + *s) : std::nullopt;
-  }
+  if (const auto in_day = half_day_s(*s, c.rest())) return *days * seconds_a_day + *in_day;
   const auto zone = zone_s(c);
   if (!zone || !c.ended()) return std::nullopt;
-  return *days * 86'400 + *s - *zone;
+  return *days * seconds_a_day + *s - *zone;
 }
 
 }  // namespace bms::files

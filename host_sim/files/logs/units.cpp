@@ -42,13 +42,13 @@ constexpr std::array time_units = {
 constexpr std::array current_units = {
     UnitName{"|a|amp|amps|ampere|amperes|", {}},
     UnitName{"|ma|milliamp|milliampere|milliamperes|", {1, 1e3, 0}},
+    UnitName{"|ca|", {1, 100, 0}},
     UnitName{"|ua|microampere|", {1, 1e6, 0}},
     UnitName{"|ka|", {1e3, 1, 0}},
 };
 constexpr std::array voltage_units = {
-    UnitName{"|v|volt|volts|", {}},
-    UnitName{"|mv|millivolt|millivolts|", {1, 1e3, 0}},
-    UnitName{"|uv|microvolt|", {1, 1e6, 0}},
+    UnitName{"|v|volt|volts|", {}}, UnitName{"|mv|millivolt|millivolts|", {1, 1e3, 0}},
+    UnitName{"|cv|", {1, 100, 0}},  UnitName{"|uv|microvolt|", {1, 1e6, 0}},
     UnitName{"|kv|", {1e3, 1, 0}},
 };
 constexpr std::array temperature_units = {
@@ -144,14 +144,14 @@ const char* units_of(Quantity quantity) {
       return "s, ms, us, ns, min, h, d";
     case Quantity::current:
     case Quantity::current_ref:
-      return "A, mA, uA, kA";
+      return "A, mA, cA, uA, kA";
     case Quantity::temperature:
     case Quantity::cell_temperature:
       return "C, K, F";
     case Quantity::soc_ref:
       return "1, %";
     default:
-      return "V, mV, uV, kV";
+      return "V, mV, cV, uV, kV";
   }
 }
 
