@@ -99,6 +99,35 @@ std::string json_of(const measurement::Recording& r, const std::string& out) {
                   {"warnings", warnings_of(r.warnings)}});
 }
 
+std::string json_of(const files::FrameList& list, const std::string& log) {
+  Json messages = Json::array();
+  for (const files::ListedMessage& m : list.messages) {
+    Json signals = Json::array();
+    for (const files::ListedSignal& s : m.signals) {
+      const bool any = s.values > s.missing;
+      signals.push_back({{"name", s.name},
+                         {"unit", s.unit},
+                         {"values", s.values},
+                         {"missing", s.missing},
+                         {"lowest", any ? Json(s.lowest) : Json(nullptr)},
+                         {"highest", any ? Json(s.highest) : Json(nullptr)},
+                         {"column", s.column.empty() ? Json(nullptr) : Json(s.column)}});
+    }
+    messages.push_back({{"name", m.name},
+                        {"id", m.id},
+                        {"extended", m.long_id},
+                        {"channel", m.channel},
+                        {"frames", m.frames},
+                        {"cycle_s", m.cycle_s()},
+                        {"signals", signals}});
+  }
+  return text_of({{"command", "import"},
+                  {"recording", log},
+                  {"messages", messages},
+                  {"unknown_frames", list.unknown_frames},
+                  {"unknown_messages", list.unknown_messages}});
+}
+
 std::string json_of(const std::string& experiment, const std::string& out, const experiments::ProfileFigures& f) {
   return text_of({{"command", "experiment"},
                   {"name", experiment},

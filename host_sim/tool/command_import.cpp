@@ -6,6 +6,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/cell_file.hpp"
+#include "files/logs/frame_list.hpp"
 #include "files/recording.hpp"
 #include "files/recording_text.hpp"
 #include "measurement/recording_checks.hpp"
@@ -30,6 +31,7 @@ class ImportCommand final : public Command {
         ->type_name("FILE");
     c.add_option("--cell", cell_, cell_help("compare the readings with this cell"));
     c.add_flag("--profile", profile_, "a current profile without a voltage");
+    c.add_flag("--list", list_, "list the messages and signals of a CAN log, and what they could be; writes nothing");
     add_part(c, part_);
     add_reading(c, reading_);
     add_json(c, output_);
@@ -40,6 +42,7 @@ class ImportCommand final : public Command {
     complete_reading(reading_);
     output_.set_own(out_);
     output_.protect({file_, cell_, reading_.dbc});
+    if (list_) return list();
     reading_.keep_all = !out_.empty();
     measurement::Recording recording = files::read_recording(
         file_, profile_ ? files::VoltageColumn::optional : files::VoltageColumn::required, reading_);
@@ -57,6 +60,13 @@ class ImportCommand final : public Command {
   }
 
  private:
+  int list() const {
+    const files::FrameList list = files::list_frames(file_, reading_);
+    if (!output_.json.empty()) write_output(output_.json, reports::json_of(list, file_));
+    print_summary(output_, files::printable(files::text_of(list), true));
+    return 0;
+  }
+
   std::string summary(const measurement::Recording& r) const {
     const auto range = [](const measurement::Column& column, std::string_view unit) {
       double low = std::nan(""), high = low;
@@ -74,7 +84,7 @@ class ImportCommand final : public Command {
   }
 
   std::string file_, out_, cell_;
-  bool profile_ = false;
+  bool profile_ = false, list_ = false;
   files::ReadOptions reading_;
   RecordingPart part_;
   Output output_;

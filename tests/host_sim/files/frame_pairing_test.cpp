@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "files/logs/frame_list.hpp"
 #include "files/logs/paired_column.hpp"
 #include "files/recording.hpp"
 #include "files/temporary_folder.hpp"
@@ -185,6 +186,38 @@ TEST_F(FramesOfOneBus, AreReadFromLinesOfCanFd) {
   EXPECT_EQ(r.rows(), 12U);
   EXPECT_EQ(r.current_a[0], 7);
   EXPECT_EQ(r.voltage_v[0], 3.3);
+}
+
+TEST_F(FramesOfOneBus, AreListedWithTheirRatesAndRangesAndWhatTheyCouldBe) {
+  const std::string dbc =
+      "BO_ 256 Pack: 8 X\n SG_ PackCurrent : 0|16@1- (0.1,0) [-3000|3000] \"A\" X\n"
+      "BO_ 257 Cells: 8 X\n SG_ P M : 0|8@1+ (1,0) [0|0] \"\" X\n SG_ Cell_3 m1 : 8|8@1+ (20,0) [0|0] \"mV\" X\n"
+      "SG_ Lost m7 : 8|8@1+ (1,0) [0|0] \"A\" X\n"
+      "BO_ 258 Other: 8 X\n SG_ MaxCurrent : 0|8@1+ (1,0) [0|0] \"A\" X\n";
+  std::string text;
+  for (int k = 0; k < 10; ++k) {
+    text += frame(0.5 * k, "can0", "100", k == 3 ? 0x8000 : -10 * k) + frame(0.5 * k, "can0", "101", 0xA501);
+    text += frame(0.5 * k, "can0", "555", 0);
+  }
+  text += frame(9, "can0", "102", 9);
+  ReadOptions options;
+  options.dbc = file("list.dbc", dbc);
+  const FrameList list = list_frames(file("list.log", text), options);
+  ASSERT_EQ(list.messages.size(), 3U);
+  EXPECT_DOUBLE_EQ(list.messages[0].cycle_s(), 0.5);
+  const ListedSignal& current = list.messages[0].signals[0];
+  EXPECT_EQ(current.column, "current_a");
+  EXPECT_EQ(current.lowest, -9);
+  EXPECT_EQ(current.highest, 0);
+  EXPECT_EQ(current.missing, 1U);
+  EXPECT_EQ(list.messages[1].signals[1].column, "v_3");
+  EXPECT_EQ(list.messages[1].signals[2].values, 0U) << "its page was not sent";
+  EXPECT_EQ(list.messages[2].signals[0].column, "") << "a limit is not the current";
+  EXPECT_EQ(list.unknown_frames, 10U);
+  EXPECT_THAT(text_of(list), HasSubstr("Pack (id 100, channel can0): 10 frames, every 0.5 s"));
+  EXPECT_THAT(text_of(list), HasSubstr("1 of 10 not available; could be --map current_a=PackCurrent"));
+  EXPECT_THAT(refusal_by("[^:]*", [&] { list_frames(file("none.log", frame(1, "can0", "555", 0)), options); }),
+              HasSubstr("no frame of a message of"));
 }
 
 }  // namespace
