@@ -120,7 +120,8 @@ bool settle(TableLayout& layout, std::string_view line, const std::string& path,
   }
   time = layout.find(Quantity::time);
   if (clock_s(field(*time)) && !layout.step) layout.day = day_column(layout, fields, options.day_first);
-  const bool has_unit = !time->unit.empty() || target_of(time->heading).has_value();
+  const bool in_seconds = layout.format->name == "arbin";  // Test_Time without a unit, in every version of its export
+  const bool has_unit = !time->unit.empty() || target_of(time->heading).has_value() || in_seconds;
   if (!has_unit && !time->clock && epoch_unit(field(*time))) {
     SourceColumn& column = *std::find_if(layout.columns.begin(), layout.columns.end(),
                                          [&](const SourceColumn& c) { return c.target == time->target; });

@@ -124,6 +124,14 @@ TEST(TableOfATester, LeavesSingleRowsWithAWrongTimeOut) {
               HasSubstr("time goes back in many rows"));
 }
 
+TEST(TableOfATester, OfArbinHasSecondsWithoutSayingSo) {
+  const auto line = [](int k) { return fmt::format("{},{},1,3.3", k + 1, 0.5 * k); };
+  const measurement::Recording r = read(table("Data_Point,Test_Time,Current,Voltage\n", 12, line));
+  EXPECT_EQ(r.time_s[11], 5.5);
+  EXPECT_THAT(r.read_as, HasSubstr("Arbin"));
+  EXPECT_THAT(refused(table("Nr,Test_Time,Current (A),Voltage (V)\n", 12, line)), HasSubstr("--unit time_s=s"));
+}
+
 TEST(TableOfATester, LeavesRepeatedRowsOut) {
   const measurement::Recording r = read(table(own, 24, [](int k) { return fmt::format("{},1,3.3", k / 2); }));
   EXPECT_EQ(r.rows(), 12U);
