@@ -95,11 +95,13 @@ struct Errors {
   double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
 };
 
-Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const healthy_data::HealthyData& healthy) {
-  const double healthy_v = thresholds.healthy.gross_times * largest_error_v(healthy),
+/// covered: share of the recordings where healthy ones were.
+Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const Options& options, double covered) {
+  const double healthy_v = largest_error_v(options.healthy), times = thresholds.healthy.gross_times,
+               times_there = std::max(times, error_factor(covered, options.false_alarm_rate)),
                tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), likelihood.cell().tolerance.ocv_v);
-  return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, healthy_v),
-          std::max(thresholds.decision.gross_v, healthy_v)};
+  return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, times * healthy_v),
+          std::max(thresholds.decision.gross_v, times_there * healthy_v)};
 }
 
 Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contributions& contributed,
@@ -107,9 +109,10 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
   const std::vector<Finding>& findings = d.findings;
   if (adequacy.unknown) return Verdict::unknown;
   // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
-  const bool covered = std::none_of(d.withheld.begin(), d.withheld.end(),
-                                    [](const Withheld& w) { return w.not_covered || w.only_place; });
-  if (!adequacy.found && covered && errors.file_v > errors.gross_v) return Verdict::unknown;
+  const bool no_blocks = d.healthy && d.healthy->blocks == 0;
+  const bool comparable =
+      std::none_of(d.withheld.begin(), d.withheld.end(), [&](const Withheld& w) { return no_blocks || w.only_place; });
+  if (!adequacy.found && comparable && errors.file_v > errors.gross_v) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
   if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
       contributed.remaining_rmse_v > errors.tolerated_v)
@@ -275,7 +278,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   const auto healthy_gain = [&](std::size_t m) { return judge_healthy->gain_needed(m); };
   d.findings = findings_of(search, survivors, contributed, judge_healthy ? HealthyGain(healthy_gain) : HealthyGain());
   add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
-  const Errors errors = errors_of(search, likelihood, options.healthy);
+  const Errors errors = errors_of(search, likelihood, options, d.healthy ? d.healthy->covered.share : 1);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
   d.verdict = verdict_of(adequacy, d, contributed, errors);
   if (search.stopped()) leave_unfinished(search, scope, d);

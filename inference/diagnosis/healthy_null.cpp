@@ -22,6 +22,8 @@ double student_tail(double t, double freedom) {
   return t > 0 ? half : 1 - half;
 }
 
+double normal_tail(double deviations) { return 0.5 * std::erfc(deviations / std::sqrt(2.0)); }
+
 /// Probability that one more value of a normal sample of n lies so many of its standard deviations above its mean. The
 /// standard deviation has a prior that counts as so many more values.
 double predictive_tail(double deviations, double n) {
@@ -92,18 +94,31 @@ double HealthyNull::log_ratio(const std::string& cause, double gain) const {
   return std::log(floor + gain) - usual;
 }
 
-HealthyComparison HealthyNull::compare(const std::string& cause, double gain) const {
+double log_spread_beyond(double covered) { return (1 - covered) * healthy_limits.log_spread_beyond; }
+
+double error_factor(double covered, double rate) {
+  double deviations = 0;
+  while (normal_tail(deviations) > rate) deviations += numerics.search.gain_step;
+  return std::exp(0.5 * deviations * log_spread_beyond(covered));
+}
+
+HealthyComparison HealthyNull::compare(const std::string& cause, double gain, double covered) const {
   HealthyComparison c;
   for (std::size_t b = 0; b < blocks_.size(); ++b) c.healthy_gain = std::max(c.healthy_gain, gain_of(b, cause));
   const auto n = static_cast<double>(blocks());
   const double ratio = log_ratio(cause, gain);
-  const auto as_extreme = static_cast<double>(
-      std::count_if(level_of_block_.begin(), level_of_block_.end(), [&](double level) { return level >= ratio; }));
+  const double elsewhere = log_spread_beyond(covered);
+  double as_extreme = 0;  // expected number of blocks that would be, there
+  bool exceeds_all = true;
+  for (const double level : level_of_block_) {
+    exceeds_all = exceeds_all && level < ratio;
+    as_extreme += elsewhere > 0 ? normal_tail((ratio - level) / elsewhere) : static_cast<double>(level >= ratio);
+  }
   c.false_alarm = (1 + as_extreme) / (n + 1);
-  if (as_extreme == 0 && n >= healthy_limits.blocks_at_least)
-    c.false_alarm = std::min(c.false_alarm, predictive_tail((ratio - mean_) / spread_, n));
+  if (exceeds_all && n >= healthy_limits.blocks_at_least)
+    c.false_alarm = std::min(c.false_alarm, predictive_tail((ratio - mean_) / std::hypot(spread_, elsewhere), n));
   c.stands_out = c.false_alarm <= rate_;
-  if (c.stands_out || as_extreme > 0 || (n > 0 && gain <= c.healthy_gain)) return c;
+  if (c.stands_out || !exceeds_all || (n > 0 && gain <= c.healthy_gain)) return c;
   // by rank alone, unless fewer blocks like these would do
   double needed = most_blocks(rate_);
   for (double more = std::max(n, healthy_limits.blocks_at_least); n > 0 && more < needed; ++more) {
@@ -114,12 +129,12 @@ HealthyComparison HealthyNull::compare(const std::string& cause, double gain) co
   return c;
 }
 
-std::optional<double> HealthyNull::gain_needed(const std::string& cause) const {
+std::optional<double> HealthyNull::gain_needed(const std::string& cause, double covered) const {
   double low = 0, high = std::log1p(numerics.search.most_gain);
-  if (!compare(cause, std::expm1(high)).stands_out) return std::nullopt;
+  if (!compare(cause, std::expm1(high), covered).stands_out) return std::nullopt;
   while (high - low > numerics.search.gain_step) {
     const double middle = (low + high) / 2;
-    (compare(cause, std::expm1(middle)).stands_out ? high : low) = middle;
+    (compare(cause, std::expm1(middle), covered).stands_out ? high : low) = middle;
   }
   return std::expm1(high);
 }

@@ -5,6 +5,9 @@
 // healthy block, with the levels of the other blocks, is what chance and model error reach on a healthy recording
 // whatever the cause. A cause is named if its own ratio is larger than that at the false alarm rate: with enough blocks
 // by its rank among them (conformal), otherwise by a Student distribution of the blocks' logarithms.
+//
+// Where no healthy block was, the model may be off by more. That widens the distribution and forbids nothing: a fault
+// may be larger than any model error that is to be expected there.
 #pragma once
 
 #include <cstddef>
@@ -29,15 +32,24 @@ struct HealthyComparison {
 /// showed nothing of it.
 double hours_if_none_shows_any(double gain, double duration_h, double rate);
 
+/// Standard deviation, in ln, of a gain where healthy blocks cover this share of the recordings, next to that of the
+/// blocks.
+double log_spread_beyond(double covered);
+
+/// Factor on the error of a healthy recording that one which healthy blocks cover so far exceeds at the false alarm
+/// rate. A gain grows as the square of an error.
+double error_factor(double covered, double rate);
+
 class HealthyNull {
  public:
   /// rate: of false alarms, 0 < rate < 1. duration_s: of the recordings to be diagnosed; gain grows with it.
   HealthyNull(const healthy_data::HealthyData& healthy, double rate, double duration_s);
 
-  /// gain: of a cause in the recordings that are diagnosed, >= 0.
-  HealthyComparison compare(const std::string& cause, double gain) const;
+  /// gain: of a cause in the recordings that are diagnosed, >= 0. covered: share of them where healthy blocks were
+  /// (HealthyCoverage::share), 0 to 1.
+  HealthyComparison compare(const std::string& cause, double gain, double covered = 1) const;
   /// The smallest gain of a cause that would stand out; nothing with too few blocks.
-  std::optional<double> gain_needed(const std::string& cause) const;
+  std::optional<double> gain_needed(const std::string& cause, double covered = 1) const;
   double hours() const { return hours_; }
   std::size_t blocks() const { return level_of_block_.size(); }
 

@@ -13,6 +13,11 @@ namespace {
 
 constexpr const HealthyThresholds& withhold_limits = thresholds.healthy;
 
+std::string cause_of(std::size_t mechanism) {
+  return std::string(mechanism == no_mechanism ? healthy_data::unknown_cause
+                                               : std::string_view(model::catalogue[mechanism].id));
+}
+
 double total_duration_s(const std::vector<PreparedRecording>& records) {
   double sum_s = 0;
   for (const PreparedRecording& r : records) sum_s += r.duration_s();
@@ -60,11 +65,12 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
 bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }
 
 HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) const {
-  const std::string cause = mechanism == no_mechanism ? std::string(healthy_data::unknown_cause)
-                                                      : std::string(model::catalogue[mechanism].id);
-  HealthyComparison c = null_.compare(cause, gain);
-  if (!is_covered()) c.stands_out = false;
-  return c;
+  return null_.compare(cause_of(mechanism), gain, basis_.covered.share);
+}
+
+Withheld HealthyJudge::withheld_of(std::size_t mechanism, const MechanismSetting& setting, double gain) const {
+  const bool would_stand_out = null_.compare(cause_of(mechanism), gain).stands_out;
+  return {mechanism, setting, gain, compare(mechanism, gain), healthy_.blocks.empty() || would_stand_out};
 }
 
 std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
@@ -76,8 +82,7 @@ std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
         return AlarmAndGain(-c.false_alarm, found.gains.at(m));
       });
   if (least == no_mechanism) return std::nullopt;
-  const double gain = found.gains.at(least);
-  return Withheld{least, *found.best.hypothesis.find(least), gain, compare(least, gain), false};
+  return withheld_of(least, *found.best.hypothesis.find(least), found.gains.at(least));
 }
 
 HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
@@ -104,13 +109,6 @@ void HealthyJudge::cover_true_current(const Survivors& found) {
   }
 }
 
-Survivors HealthyJudge::withhold_all(const Survivors& found) {
-  for (Withheld& w : withheld_) w.not_covered = true;
-  for (const std::size_t m : found.best.hypothesis.added())
-    withheld_.push_back({m, *found.best.hypothesis.find(m), found.gains.at(m), compare(m, found.gains.at(m)), true});
-  return {control_, {}, {}, {}};
-}
-
 Survivors HealthyJudge::with_current_sensor(Survivors found) {
   std::vector<std::size_t> sensor = scope_.searched;
   std::erase_if(sensor, [](std::size_t m) { return !is_of_current(m); });
@@ -125,7 +123,6 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     found = with_current_sensor(std::move(found));
     cover_true_current(found);
   }
-  if (!is_covered()) return withhold_all(found);
   for (bool removed = true; removed;) {
     removed = false;
     while (std::optional<Withheld> least = least_of(found)) {
@@ -139,21 +136,19 @@ Survivors HealthyJudge::without_withheld(Survivors found) {
     if (removed) found = eliminate(search_, likelihood_, control_, found.best, scope_);
   }
   if (!withheld_.empty()) cover_true_current(found);
-  return is_covered() ? found : withhold_all(found);
+  return found;
 }
 
 std::optional<double> HealthyJudge::gain_needed(std::size_t mechanism) const {
-  if (!is_covered()) return std::nullopt;
-  return null_.gain_needed(std::string(model::catalogue[mechanism].id));
+  return null_.gain_needed(cause_of(mechanism), basis_.covered.share);
 }
 
 void HealthyJudge::withhold_unknown(Adequacy& adequacy) {
   if (!adequacy.unknown) return;
   const double gain = unknown_gain(adequacy.residual);
-  const HealthyComparison c = compare(no_mechanism, gain);
-  if (c.stands_out) return;
+  if (compare(no_mechanism, gain).stands_out) return;
   adequacy.unknown = false;
-  withheld_.push_back({no_mechanism, {}, gain, c, !is_covered()});
+  withheld_.push_back(withheld_of(no_mechanism, {}, gain));
 }
 
 std::vector<Withheld> HealthyJudge::withheld() const {

@@ -50,9 +50,8 @@ class HealthyJudge {
   /// Result when current-sensor faults are tried first: a recording beyond the healthy ones may be there because of
   /// it, and its signature, which is linear, says little of a gain that doubles the reading.
   Survivors with_current_sensor(Survivors found);
-  /// Withholds everything: the healthy recordings do not cover these.
-  Survivors withhold_all(const Survivors& found);
   HealthyComparison compare(std::size_t mechanism, double gain) const;
+  Withheld withheld_of(std::size_t mechanism, const MechanismSetting& setting, double gain) const;
   /// The mechanism that stands out least; nothing if all stand out.
   std::optional<Withheld> least_of(const Survivors& found) const;
 
