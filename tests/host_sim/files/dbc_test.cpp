@@ -53,7 +53,7 @@ std::vector<SmallFile> sections() {
       {"BO_TX_BU_", with("", "BO_TX_BU_ 291 : Bms,Charger;\n"), volts, 3.288},
       {"EV_", with("", "EV_ Key: 0 [0|1] \"\" 0 1 DUMMY_NODE_VECTOR0 Vector__XXX;\n"), volts, 3.288},
       {"CM_ with keywords and lines", with("", "CM_ SG_ 291 U \"a\nSG_ wrong\nBO_ too; \"\" text\";\n"), volts, 3.288},
-      {"CM_ with quotes inside", with("CM_ \"he said \"yes\" twice\";\n", ""), volts, 3.288},
+      {"CM_ with a quote inside", with("CM_ \"a 5\" hose\nSG_ too\";\n", ""), volts, 3.288},
       {"CM_ with a path", with("CM_ \"C:\\cars\\\";\n", ""), volts, 3.288},
       {"BA_DEF_, BA_DEF_DEF_, BA_",
        with("", "BA_DEF_ BO_  \"Cycle\" INT 0 9;\nBA_DEF_DEF_  \"Cycle\" 1;\nBA_ \"Cycle\" BO_ 291 7;\n"), volts,
