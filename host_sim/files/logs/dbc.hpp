@@ -3,7 +3,7 @@
 //
 // All sections of the format are accepted. Used are BO_, SG_ (with multiplexing), SG_MUL_VAL_, SIG_VALTYPE_, the texts
 // of VAL_, and the attributes Invalid, VFrameFormat, ProtocolType and the long names. The reader is written here
-// because Debian has no DBC library for C++; tests/files/compare_dbc.py compares it with canmatrix.
+// because Debian has no DBC library for C++; tests/host_sim/files/compare_dbc.py compares it with canmatrix.
 #pragma once
 
 #include <cstdint>
