@@ -176,7 +176,8 @@ std::string by_size(const std::vector<Result>& results) {
   std::string text =
       "\n| size, in stated limits | bounds of a real instrument | faults | detected | first name right | another name "
       "first | DATA_FAULT | NOT_TESTABLE |\n|---|---|---|---|---|---|---|---|\n";
-  for (const auto& [times, name] : sizes) {
+  for (const auto& size : sizes) {
+    const std::string& name = size.second;
     for (const bool within : {true, false}) {
       const Which here = [&](const Result& r) {
         return !r.fault.empty() && r.over_limit && times_text(*r.over_limit) == name && r.within_bounds == within;

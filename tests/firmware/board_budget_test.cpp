@@ -116,8 +116,9 @@ TEST(StackDepth, OfAFunctionAgreesWithTheCompiler) {
       compiler[(*it)[1]] = static_cast<std::uint32_t>(std::stoul((*it)[2]));
   }
   std::size_t compared = 0;
-  for (const auto& [address, f] :
+  for (const auto& function :
        functions_of(images::output_of({"arm-none-eabi-objdump", "--disassemble", "--demangle", image.string()}))) {
+    const auto& f = function.second;
     const auto known = std::find_if(compiler.begin(), compiler.end(), [&](const auto& c) {
       return c.first == f.name || c.first.ends_with(" " + f.name);
     });

@@ -77,7 +77,7 @@ void UnicornCore::map(std::uint32_t address, std::uint32_t bytes, Access access)
 }
 
 void UnicornCore::map_registers(std::uint32_t address, std::uint32_t bytes) {
-  peripherals_.push_back(std::make_unique<Peripherals>(this, address));
+  peripherals_.push_back(std::make_unique<Peripherals>(Peripherals{this, address}));
   const auto reads = +[](uc_engine*, std::uint64_t at, unsigned size, void* of) -> std::uint64_t {
     const auto* peripherals = static_cast<Peripherals*>(of);
     return peripherals->core->on_read(peripherals->address + static_cast<std::uint32_t>(at), size);
