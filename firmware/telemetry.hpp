@@ -5,9 +5,11 @@
 // when the next one may follow (lock step).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <tuple>
+#include <type_traits>
 
 #include "estimator/pack_estimator.hpp"
 #include "firmware/commands.hpp"
@@ -74,16 +76,19 @@ class Telemetry {
 
  private:
   /// Time of the last frame of a message, and its counter.
-  template <class Message>
   struct SendState : Cycle {
     std::uint8_t counter = 0;
   };
-  template <class>
-  struct SendStatesOf;
-  template <class... Message>
-  struct SendStatesOf<std::tuple<Message...>> {
-    using type = std::tuple<SendState<Message>...>;
-  };
+  template <class Message>
+  SendState& state_of() {
+    constexpr std::size_t place = []<class... Known>(std::type_identity<std::tuple<Known...>>) {
+      std::size_t before = 0;
+      (void)((std::is_same_v<Message, Known> || (++before, false)) || ...);
+      return before;
+    }(std::type_identity<can::Messages>());
+    static_assert(place < std::tuple_size_v<can::Messages>);
+    return sent_[place];
+  }
 
   template <class Message>
   void send(const Message& message) {
@@ -95,7 +100,7 @@ class Telemetry {
   }
   template <class Message, class Content>
   void send_as(const Content& message) {
-    auto& sent = std::get<SendState<Message>>(sent_);
+    SendState& sent = state_of<Message>();
     hal::can_send(message.frame(sent.counter));
     sent.counter = can::next(sent.counter);
   }
@@ -103,13 +108,13 @@ class Telemetry {
   /// Calls message() only when it is due.
   template <class Message, class Make>
   void send_if_due(Make&& message) {
-    if (std::get<SendState<Message>>(sent_).due(now_us_, Message::cycle_us)) send(message());
+    if (state_of<Message>().due(now_us_, Message::cycle_us)) send(message());
   }
 
   /// Sends when the message is due, or at once when its content has changed.
   template <class Message, class Make>
   void send_if_due_or_changed(bool changed, Make&& message) {
-    if (changed) std::get<SendState<Message>>(sent_).restart();
+    if (changed) state_of<Message>().restart();
     send_if_due<Message>(message);
   }
 
@@ -178,7 +183,7 @@ class Telemetry {
 
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
-  typename SendStatesOf<can::Messages>::type sent_{};
+  std::array<SendState, std::tuple_size_v<can::Messages>> sent_{};  ///< a tuple takes 800 bytes of code to initialise
   StoredData stored_data_;
   estimator::EstimateHash hash_;
   protection::FaultSet published_faults_ = 0;
