@@ -130,23 +130,9 @@ class DbcScanner {
   }
   bool at(char c) { return more() && text_[at_] == c; }
 
-  std::optional<std::uint64_t> whole() {
-    const std::string_view found = peek();
-    std::uint64_t value = 0;
-    const auto [end, error] = std::from_chars(found.data(), found.data() + found.size(), value);
-    if (found.empty() || error != std::errc() || end != found.data() + found.size()) return std::nullopt;
-    pass(found.size());
-    return value;
-  }
+  std::optional<std::uint64_t> whole() { return digits<std::uint64_t>(); }
   /// A signed number without decimals.
-  std::optional<std::int64_t> integer() {
-    const std::string_view found = peek();
-    std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(found.data(), found.data() + found.size(), value);
-    if (found.empty() || error != std::errc() || end != found.data() + found.size()) return std::nullopt;
-    pass(found.size());
-    return value;
-  }
+  std::optional<std::int64_t> integer() { return digits<std::int64_t>(); }
   std::optional<Decimal> decimal() {
     const std::string_view found = peek();
     const auto value = decimal_of(found);
@@ -190,6 +176,16 @@ class DbcScanner {
   }
 
  private:
+  /// A word that is a number without decimals, and nothing else.
+  template <class Number>
+  std::optional<Number> digits() {
+    const std::string_view found = peek();
+    Number value = 0;
+    const auto [end, error] = std::from_chars(found.data(), found.data() + found.size(), value);
+    if (found.empty() || error != std::errc() || end != found.data() + found.size()) return std::nullopt;
+    pass(found.size());
+    return value;
+  }
   static bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
   static bool is_of_word(char c) {
     constexpr std::string_view signs = "\":;|@()[],";
