@@ -20,6 +20,8 @@ def main():
         if path.startswith("tests/"):
             tests |= {".".join(found) for found in re.findall(r"^TEST(?:_F|_P)?\((\w+), (\w+)\)",
                                                               sources.read(root, path), re.M)}
+    for path in sources.paths(root, ("CMakeLists.txt",)):
+        tests |= set(re.findall(r"add_test\(NAME (\w+\.\w+)", sources.read(root, path)))
     faults, seen = [], set()
     for number, line in enumerate(sources.read(root, LIST).splitlines(), 1):
         if line.startswith("#"):
