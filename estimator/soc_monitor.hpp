@@ -165,8 +165,9 @@ class SocMonitor {
                                    const Voltage& innovation_v, const Variance& of_resistances_v2,
                                    std::uint8_t interval, State& state) {
     const bool watched = bank_.in_background();
-    bank_.update(cell, input, constants, soc, Errors::with_error(state, innovation_v), of_resistances_v2, interval,
-                 state);
+    const Voltage deviation_v = Errors::with_error(state, innovation_v);
+    for (int k = constants.bank_points(); k > 0 && bank_.open(); --k)
+      bank_.update(cell, input, constants, soc, deviation_v, of_resistances_v2, interval, state);
     if (watched && !bank_.in_background()) {
       contradicted_ = true;
       consistency_.reset();

@@ -47,6 +47,8 @@ class StepConstants {
   constexpr const Coupling& known_noise() const { return known_noise_; }
   constexpr const Coupling& relaxing_noise() const { return relaxing_noise_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
+  /// Points of the bank that a sample updates: as many as pass in its time at rows of one to two seconds.
+  constexpr int bank_points() const { return bank_points_; }
   constexpr const typename Model::OptionalErrorDecay& error_decay() const { return error_decay_; }
 
   static constexpr std::uint32_t capped(std::uint64_t step_us) {
@@ -59,8 +61,12 @@ class StepConstants {
     const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
     correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
     update_resistance_noise();
-    bank_share_ = correlated_samples > Count(SocBank<S>::points)
-                      ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
+    bank_points_ = 1;
+    for (std::uint32_t us = capped(step_us) / 2; us >= 1'000'000 && bank_points_ < 2 * SocBank<S>::points; us /= 2)
+      bank_points_ = static_cast<std::uint8_t>(2 * bank_points_);
+    const int turn = 2 * SocBank<S>::points / bank_points_;  // samples
+    bank_share_ = correlated_samples > Count(turn) * Fraction(0.5)
+                      ? arithmetic::ratio<Fraction>(Count(turn), correlated_samples)
                       : Fraction(SocBank<S>::max_share);
     const Soc white = accumulated_soc(noise.white_soc_per_s);
     soc_noise_ = Errors::soc_noise(Variance(white * white), noise, duration_s_);
@@ -98,6 +104,11 @@ class StepConstants {
   constexpr Soc unknown_charge(const Cell& cell, const Current& counted_a) const {
     return accumulated_soc(
         Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
+  }
+  /// SOC by which a current, >= 0, moves the cell in a step; 1 at most.
+  template <class Cell>
+  constexpr Soc charge_of(const Cell& cell, const Current& current_a) const {
+    return accumulated_soc(Soc(current_a * cell.limits.soc_per_as));
   }
 
  private:
@@ -140,6 +151,7 @@ class StepConstants {
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
   Fraction bank_share_{};
+  std::uint8_t bank_points_ = 1;
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
   Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };

@@ -1,6 +1,8 @@
 #include "estimator/step_constants.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -25,6 +27,22 @@ TEST(StepConstants, AnErrorThatPersistsCountsOncePerItsCorrelationTime) {
   EXPECT_DOUBLE_EQ(c.correlated_samples(), cell.noise.model_correlation_s / 0.5);
   c.set_time_step(cell.noise, 4'000'000'000);
   EXPECT_EQ(c.correlated_samples(), 1) << "a step longer than the correlation time is one sample";
+}
+
+TEST(StepConstants, ATurnOfTheBankTakesMinutesAtAnyInterval) {
+  const auto cell = tests::prepared<double>();
+  Constants<double> c;
+  for (const double step_s : {0.1, 1.0, 1.9}) {
+    c.set_time_step(cell.noise, static_cast<std::uint64_t>(1e6 * step_s));
+    EXPECT_EQ(c.bank_points(), 1) << step_s;
+  }
+  for (const double step_s : {2.0, 5.0, 10.0, 30.0, 60.0, 127.0, 300.0, 3'600.0}) {
+    c.set_time_step(cell.noise, static_cast<std::uint64_t>(1e6 * step_s));
+    const int samples = 2 * SocBank<double>::points / c.bank_points();
+    EXPECT_EQ(samples * c.bank_points(), 2 * SocBank<double>::points) << step_s << ": ends with a sample";
+    EXPECT_LE(samples * step_s, std::max(256.0, step_s)) << step_s;
+    EXPECT_DOUBLE_EQ(c.bank_share(), std::min(samples * step_s / cell.noise.model_correlation_s, 1.9)) << step_s;
+  }
 }
 
 TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
