@@ -9,8 +9,8 @@
 // be the model that is wrong. The largest sigma of the last half hour counts, since d lags behind.
 //
 // The mean needs half an hour to show what a single voltage shows at once. One reading may be wrong; a deviation of
-// more than 5 standard deviations at every check of three minutes is more than that: a cell that stays below the knee is
-// empty.
+// more than 5 standard deviations at every check of three minutes is more than that: a cell that stays below the knee
+// is empty.
 //
 // The overpotential counts in the same way: its mean over half an hour is a part of the voltage noise, because the
 // error of a polarisation outlasts the load.

@@ -105,10 +105,11 @@ class StepConstants {
     return accumulated_soc(
         Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
   }
-  /// SOC by which a current, >= 0, moves the cell in a step; 1 at most.
+  /// SOC by which a current, >= 0, moves the cell in a step of longest_step_us at most; 1 at most.
   template <class Cell>
   constexpr Soc charge_of(const Cell& cell, const Current& current_a) const {
-    return accumulated_soc(Soc(current_a * cell.limits.soc_per_as));
+    const Soc most(1), moved = Soc(current_a * cell.limits.soc_per_as) * duration_s_;
+    return moved < most ? moved : most;
   }
 
  private:

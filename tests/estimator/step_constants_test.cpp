@@ -56,6 +56,10 @@ TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
   EXPECT_DOUBLE_EQ(c.unknown_charge(cell, -3.0), rate + 3.0 / 6 / 3'600);
   c.set_time_step(cell.noise, 86'400'000'000);
   EXPECT_EQ(c.unknown_charge(cell, 6.0), 1) << "not more than the capacity";
+  EXPECT_DOUBLE_EQ(c.charge_of(cell, 3.0), 3.0 * 4'095 / 6 / 3'600);
+  c.set_time_step(cell.noise, ~std::uint64_t{0});
+  EXPECT_EQ(c.charge_of(cell, 0.0), 0) << "at once";
+  EXPECT_EQ(c.charge_of(cell, 12.0), 1);
 }
 
 TEST(StepConstants, ColdAndHeatMakeResistancesUncertainThatFollowNoTemperature) {
