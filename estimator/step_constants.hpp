@@ -46,6 +46,9 @@ class StepConstants {
   /// The same as resistance_noise() for an overpotential that relaxes: what the cell file knows, and the temperature.
   constexpr const Coupling& known_noise() const { return known_noise_; }
   constexpr const Coupling& relaxing_noise() const { return relaxing_noise_; }
+  /// What the overpotential is wrong by outside of the temperatures of the identification, over what it is wrong by
+  /// inside of them; 1 at most.
+  constexpr const Fraction& extrapolated() const { return extrapolated_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
   /// Points of the bank that a sample updates: as many as pass in its time at rows of one to two seconds.
   constexpr int bank_points() const { return bank_points_; }
@@ -80,11 +83,16 @@ class StepConstants {
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     known_error_ = Coupling(cell.noise.resistance_error);
     Coupling unknown(0);
+    extrapolated_ = Fraction(0);
     if (measurement::temperature_possible(cdegc)) {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
-      if (laws_of(cell).resistances_follow_temperature())
-        known_error_ = Coupling(known_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
-      else if (cdegc != cell.reference.cdegc)
+      if (laws_of(cell).resistances_follow_temperature()) {
+        const Coupling more = extrapolation_error(cell.noise.identified, cdegc, c);
+        if (more > Coupling(0))
+          extrapolated_ =
+              more < known_error_ ? arithmetic::ratio<Fraction>(Variance(more), Variance(known_error_)) : Fraction(1);
+        known_error_ = Coupling(known_error_ + more);
+      } else if (cdegc != cell.reference.cdegc)
         unknown = arithmetic::magnitude(Coupling(
             model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c, c) - Factor(1)));
     }
@@ -151,7 +159,7 @@ class StepConstants {
   Variance soc_noise_{};
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
-  Fraction bank_share_{};
+  Fraction bank_share_{}, extrapolated_{};
   std::uint8_t bank_points_ = 1;
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
   Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};

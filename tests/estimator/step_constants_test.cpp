@@ -110,9 +110,13 @@ TEST(StepConstants, ACellThatFollowsTheTemperatureIsUncertainOutsideOfItsIdentif
   for (const double celsius : {0.0, 25.0, 40.0}) {
     c.set_temperature(cell, static_cast<std::int16_t>(100 * celsius));
     EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error) << celsius;
+    EXPECT_EQ(c.extrapolated(), 0) << celsius;
   }
+  c.set_temperature(cell, -10);
+  EXPECT_NEAR(c.extrapolated(), 0.2 * (1 / 273.05 - 1 / 273.15) / k_ev / cell.noise.resistance_error, 1e-5);
   c.set_temperature(cell, -2'000);
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 253.15 - 1 / 273.15) / k_ev, 1e-5);
+  EXPECT_EQ(c.extrapolated(), 1) << "ten times what it is wrong by inside";
   c.set_temperature(cell, 6'000);
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 313.15 - 1 / 333.15) / k_ev, 1e-5);
 }

@@ -3,6 +3,7 @@
 //
 //   soc_intervals               prints the tables
 //   soc_intervals NAME...       of the recordings whose file name contains a NAME
+//   soc_intervals --cell FILE NAME...   with another cell file
 //   soc_intervals --write       writes the tables of all recordings into docs/figures/soc_trials.md
 #include <algorithm>
 #include <array>
@@ -167,7 +168,7 @@ std::string row(const Interval& interval, const Start& start, Figures& f) {
                      100 * measurement::median(f.sigmas), failing(f.runs));
 }
 
-std::string table(const std::vector<std::string>& names) {
+std::string table(const std::vector<std::string>& names, const std::string& other_cell) {
   std::string text =
       "| row, current | start | SOC RMSE, median and worst, % | inside two sigma, mean and worst, % | median of error "
       "/ "
@@ -178,7 +179,7 @@ std::string table(const std::vector<std::string>& names) {
     for (const Case& c : cases()) {
       const auto has = [&](const std::string& n) { return c.recording.string().find(n) != std::string::npos; };
       if (!std::filesystem::exists(c.recording) || (!names.empty() && std::ranges::none_of(names, has))) continue;
-      const files::CellFile cell = files::read_cell(c.cell);
+      const files::CellFile cell = files::read_cell(other_cell.empty() ? c.cell : other_cell);
       const measurement::Recording r = files::read_recording(c.recording.string());
       const Log log = interval.row_s < 1 ? finer(r, interval.row_s) : rarer(r, interval);
       for (std::size_t s = 0; s < starts.size(); ++s) add(figures[s], c, cell, log, starts[s]);
@@ -193,15 +194,19 @@ std::string table(const std::vector<std::string>& names) {
 
 int main(int argc, char** argv) {
   std::vector<std::string> names;
+  std::string cell;
   bool write = false;
   for (int k = 1; k < argc; ++k) {
-    if (std::string_view(argv[k]) == "--write")
+    const std::string_view word = argv[k];
+    if (word == "--write")
       write = true;
+    else if (word == "--cell" && k + 1 < argc)
+      cell = argv[++k];
     else
       names.emplace_back(argv[k]);
   }
   try {
-    const std::string text = bms::table(names);
+    const std::string text = bms::table(names, cell);
     if (write)
       bms::files::replace_figures(bms::source / "docs/figures/soc_trials.md", "intervals", text);
     else
