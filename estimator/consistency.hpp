@@ -8,6 +8,10 @@
 // are normal. SocEstimator then opens the bank of hypotheses, with d^2 as a part of the model's error, because it may
 // be the model that is wrong. The largest sigma of the last half hour counts, since d lags behind.
 //
+// The mean needs half an hour to show what a single voltage shows at once. One reading may be wrong; a deviation of
+// more than 5 standard deviations at every check of three minutes is more than that: a cell that stays below the knee
+// is empty.
+//
 // The overpotential counts in the same way: its mean over half an hour is a part of the voltage noise, because the
 // error of a polarisation outlasts the load.
 //
@@ -32,6 +36,8 @@ class Consistency {
  public:
   static constexpr double mean_over_s = 1'800;
   static constexpr double max_sigmas = 3;
+  /// The same for a deviation at every check of so long. Less often in a normal error, since each check is a chance.
+  static constexpr double far_sigmas = 5, far_for_s = 180;
   /// Smallest standard deviation of any model's voltage over half an hour [V], whatever its cell file says.
   static constexpr double min_error_v = 0.005;
   static constexpr int turn_bits = 26;  ///< microseconds of a turn, as a power of two
@@ -63,6 +69,9 @@ class Consistency {
 
   /// deviation_v: of a reading from the model; overpotential_v: of the model; share: of this check in the means.
   constexpr void add(const Voltage& deviation_v, const Voltage& overpotential_v, const Fraction& share) {
+    if (is_unjudged_) far_for_ = not_far();
+    is_unjudged_ = true;
+    deviation_v_ = deviation_v;
     mean_v_ = Voltage(mean_v_ + share * Voltage(deviation_v - mean_v_));
     overpotential_v_ = Voltage(overpotential_v_ + share * Voltage(overpotential_v - overpotential_v_));
     loads_v2_ = Variance(Variance(loads_v2_ - arithmetic::product<Variance>(loads_v2_, share)) +
@@ -80,22 +89,41 @@ class Consistency {
   constexpr bool is_inconsistent(const Variance& expected_v2, const Fraction& share) {
     expected_v2_ = Variance(expected_v2_ - arithmetic::product<Variance>(expected_v2_, share));
     if (expected_v2_ < expected_v2) expected_v2_ = expected_v2;
-    return !(variance() <= arithmetic::product<Variance>(expected_v2_, arithmetic::Count<S>(max_sigmas * max_sigmas)));
+    if (is_unjudged_) add_to_far(share);
+    return far_for_ >= Fraction(far_for_s / mean_over_s) || !is_within(variance(), max_sigmas);
   }
   /// The deviation so far is explained; the next sample is checked.
   constexpr void reset() {
     force_check();
     mean_v_ = Voltage(0);
+    far_for_ = not_far();
     expected_v2_ = Variance{};
   }
 
  private:
   friend struct LaneAccess;
 
+  static constexpr Fraction not_far() { return Fraction(-1); }
+  constexpr bool is_within(const Variance& deviation_v2, double sigmas) const {
+    return deviation_v2 <= arithmetic::product<Variance>(expected_v2_, arithmetic::Count<S>(sigmas * sigmas));
+  }
+  constexpr void add_to_far(const Fraction& share) {
+    is_unjudged_ = false;
+    if (is_within(deviation_v_ * deviation_v_, far_sigmas))
+      far_for_ = not_far();
+    else if (far_for_ < Fraction(0))
+      far_for_ = Fraction(0);
+    else if (far_for_ < Fraction(far_for_s / mean_over_s))
+      far_for_ = Fraction(far_for_ + share);
+  }
+
   Voltage unchecked_below_v_{-1};
   std::uint64_t last_us_ = 0;  ///< time of the last check that was asked for
   Voltage mean_v_{}, overpotential_v_{};
   Variance loads_v2_{};
+  Voltage deviation_v_{};        ///< of the last check
+  Fraction far_for_{not_far()};  ///< time for which every check was far, in mean_over_s
+  bool is_unjudged_ = false;     ///< the last check did not get to is_inconsistent()
   Variance expected_v2_{};
 };
 

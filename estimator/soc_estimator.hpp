@@ -71,7 +71,7 @@ class SocEstimator {
     time_us_ = sample.time_us;
     std::uint32_t flags = 0;
     const AcceptedCurrent current = check_.current(sample.current_ua, cell.plausible, flags);
-    if (is_unchecked(step_us)) flags |= set_time_step(cell, step_us);
+    if (is_unchecked(step_us)) flags |= set_time_step(cell, step_us, current.ua);
     if (sample.temperature_cdegc >> temperature_bin_bits != temperature_bin_) [[unlikely]]
       set_temperature(cell, sample.temperature_cdegc);
     const auto& laws = laws_of(cell);
@@ -85,8 +85,8 @@ class SocEstimator {
     const auto discretisation = Model::discretise(laws, state_.model_state, at, input, constants_.error_decay());
     auto noise = Model::noise(laws, discretisation, cell.noise);
     noise[Model::soc] = constants_.soc_noise();
-    if ((flags & unmeasured) != 0) [[unlikely]]
-      add_unknown_current(cell, at, input, flags, noise);
+    if ((flags & (unmeasured | current_varies)) != 0) [[unlikely]]
+      flags = add_unknown_current(cell, at, input, flags, noise);
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
     state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
     state_.model_state = Model::advance(state_.model_state, at, discretisation, input);
@@ -129,6 +129,11 @@ class SocEstimator {
 
   static constexpr std::uint32_t unmeasured = time_gap | current_missing | current_implausible;
   static constexpr std::uint32_t voltage_was_used = 1U << 31;  ///< of check_voltage(); not a Flag
+  static constexpr std::uint32_t current_varies = 1U << 30;    ///< perhaps, between two rows; not a Flag
+
+  /// Sensors give the mean over a second or less. What flowed in the rest of a longer row is not known.
+  static constexpr std::uint64_t row_hides_us = 2'000'000;
+  static constexpr double change_share = 1.0 / 8;  ///< of a row in the mean square of the changes
 
   static constexpr int temperature_bin_bits = 8;  ///< a bin of temperatures is 2.56 K wide
   static constexpr std::int16_t no_temperature_bin = 0x7FFF;
@@ -180,12 +185,17 @@ class SocEstimator {
   }
   /// Returns the flags of the step. By value: flags whose address is taken would be kept in memory.
   template <class Cell>
-  [[gnu::noinline]] constexpr std::uint32_t set_time_step(const Cell& cell, std::uint64_t step_us) {
+  [[gnu::noinline]] constexpr std::uint32_t set_time_step(const Cell& cell, std::uint64_t step_us,
+                                                          std::int32_t current_ua) {
     std::uint32_t flags = 0;
     // a gap is checked again even if the next step is as long: gaps of equal length are gaps
-    checked_step_us_ = check_.gap(constants_.capped(step_us), flags) ? 0 : static_cast<std::uint32_t>(step_us);
-    constants_.set_time_step(cell.noise, step_us);
-    return flags;
+    const bool gap = check_.gap(constants_.capped(step_us), flags), hides = step_us >= row_hides_us;
+    checked_step_us_ = gap || hides ? 0 : static_cast<std::uint32_t>(step_us);
+    if (constants_.step_us() != step_us) constants_.set_time_step(cell.noise, step_us);
+    half_change_ua_ = hides && row_hid_ ? current_ua / 2 - row_ua_ / 2 : 0;
+    row_ua_ = current_ua;
+    row_hid_ = hides;
+    return hides ? flags | current_varies : flags;
   }
 
   template <class Cell>
@@ -194,20 +204,43 @@ class SocEstimator {
     constants_.set_temperature(cell, cdegc);
   }
 
-  /// Process noise of a step in which a current flowed that was not measured.
+  /// Process noise of a step in which a current flowed that was not measured. Returns the flags without current_varies.
   template <class Cell>
-  constexpr void add_unknown_current(const Cell& cell, const At& at, const StepInput& input, std::uint32_t flags,
-                                     typename Model::Variances& noise) const {
+  constexpr std::uint32_t add_unknown_current(const Cell& cell, const At& at, const StepInput& input,
+                                              std::uint32_t flags, typename Model::Variances& noise) {
+    if ((flags & current_varies) != 0) add_hidden_current(cell, at, noise);
+    flags &= ~current_varies;
+    if ((flags & unmeasured) == 0) return flags;
     const bool measured = (flags & (current_missing | current_implausible)) == 0;
     // such an error keeps its sign, so standard deviations add: (sigma + d)^2 - sigma^2
     const Soc d = constants_.unknown_charge(cell, measured ? Current(0) : input.current_a);
     const Soc sigma = arithmetic::root<Soc>(state_.soc_variance());
-    noise[Model::soc] = Variance(constants_.soc_noise() + (Variance(d * d) + Variance((sigma + sigma) * d)));
-    if (measured) return;
+    noise[Model::soc] = Variance(noise[Model::soc] + (Variance(d * d) + Variance((sigma + sigma) * d)));
+    if (measured) return flags;
     // the drop over the resistances is unknown as well
     const Voltage unknown_v =
         steady_state_drop_v<S>(at, Current(arithmetic::magnitude(input.current_a) + cell.noise.unknown_a));
     noise[0] = Variance(noise[0] + unknown_v * unknown_v);
+    return flags;
+  }
+
+  /// What flowed between two readings that are far apart. A row may have the last reading instead of the mean since the
+  /// row before. As soon as the load forgets itself within a row, half the mean square of the change from row to row is
+  /// the variance of a reading about the mean of its row. A load that is constant has neither.
+  template <class Cell>
+  constexpr void add_hidden_current(const Cell& cell, const At& at, typename Model::Variances& noise) {
+    const Current half_a = arithmetic::magnitude(arithmetic::from_micro<Current>(half_change_ua_));
+    const auto add = [](Variance& mean, const Variance& half_squared, Variance& to) {
+      const Variance half_change2 = Variance(half_squared + half_squared);
+      mean = Variance(Variance(mean - arithmetic::product<Variance>(mean, Fraction(change_share))) +
+                      arithmetic::product<Variance>(half_change2, Fraction(change_share)));
+      if (mean < Variance(1e-12)) mean = Variance{};
+      to = Variance(to + mean);
+    };
+    const Soc d = constants_.charge_of(cell, half_a);
+    const Voltage drop_v = steady_state_drop_v<S>(at, half_a);
+    add(hidden_soc2_, d * d, noise[Model::soc]);
+    add(hidden_drop_v2_, drop_v * drop_v, noise[0]);
   }
 
   /// predicted_v: before the correction.
@@ -333,6 +366,9 @@ class SocEstimator {
   [[no_unique_address]] Errors errors_;
   std::uint64_t time_us_ = 0;
   std::uint32_t checked_step_us_ = 0;  ///< last step that was not a gap; a step of this length is not checked again
+  std::int32_t row_ua_ = 0, half_change_ua_ = 0;  ///< current of the last row whose length was checked; half its change
+  Variance hidden_soc2_{}, hidden_drop_v2_{};     ///< of a row, by what its reading does not show
+  bool row_hid_ = false;                          ///< that row was row_hides_us long
   std::uint8_t interval_ = 0;
   std::int16_t temperature_cdegc_ = static_cast<std::int16_t>(100 * model::assumed_ambient_c);
   std::int16_t temperature_bin_ = no_temperature_bin;

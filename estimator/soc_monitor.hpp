@@ -70,9 +70,11 @@ class SocMonitor {
     }
     const Variance mean_v2 = consistency_.overpotential_v2(),
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
-    reading_noise_v2_ = Variance(
-        cell.noise.voltage_v2 + Variance(load_.noise_v2(mean_v2, cell, constants) +
-                                         arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
+    reading_noise_v2_ =
+        Variance(Variance(cell.noise.voltage_v2 +
+                          arithmetic::product<Variance>(seen_v2(constants), constants.correlated_samples())) +
+                 Variance(load_.noise_v2(mean_v2, cell, constants) +
+                          arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
   }
 
   constexpr bool needs_check(const Soc& soc, const Voltage& innovation_v) const {
@@ -85,8 +87,10 @@ class SocMonitor {
     const Voltage present_v = Errors::without_error(state, above_ocv_v);
     const Variance mean_v2 = consistency_.overpotential_v2(), present_v2 = present_v * present_v,
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
+    const Variance of_known_v2 =
+        arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2());
     return Variance(
-        arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2()) +
+        Variance(judged_by_bank() ? of_known_v2 : Variance(of_known_v2 + seen_v2(constants))) +
         arithmetic::product<Variance>(Variance(present_v2 + by_temperature_v2), constants.temperature_error2()));
   }
 
@@ -107,6 +111,15 @@ class SocMonitor {
 
  private:
   friend struct LaneAccess;
+
+  /// The bank has the SOC.
+  constexpr bool judged_by_bank() const { return bank_.open() && !bank_.in_background(); }
+  /// Variance of a voltage by a model that is used at another temperature than it was identified at: it is as wrong
+  /// there as it was in the last half hour.
+  template <class Constants>
+  constexpr Variance seen_v2(const Constants& constants) const {
+    return arithmetic::product<Variance>(consistency_.variance(), constants.extrapolated());
+  }
 
   /// By how much a SOC is outside of what a cell can have; else <= 0.
   static constexpr Soc beyond_range(const Soc& soc) {
@@ -131,13 +144,12 @@ class SocMonitor {
                           Errors::model_error_beyond_states(cell.noise)) +
                  Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state, h) + of_resistances_v2));
     const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
-    const bool judged_by_bank = bank_.open() && !bank_.in_background();
     const Soc beyond = beyond_range(soc);
     const bool impossible =
         beyond > Soc(0) &&
         Variance(beyond * beyond) >
             arithmetic::product<Variance>(variance, Count(Consistency<S>::max_sigmas * Consistency<S>::max_sigmas));
-    if ((consistency_.is_inconsistent(expected_v2, share_) || impossible) && !judged_by_bank) {
+    if ((consistency_.is_inconsistent(expected_v2, share_) || impossible) && !judged_by_bank()) {
       estimate_again(cell, soc, variance, of_model_v2, state);
       return soc_ambiguous | soc_contradicted;
     }
@@ -165,8 +177,9 @@ class SocMonitor {
                                    const Voltage& innovation_v, const Variance& of_resistances_v2,
                                    std::uint8_t interval, State& state) {
     const bool watched = bank_.in_background();
-    bank_.update(cell, input, constants, soc, Errors::with_error(state, innovation_v), of_resistances_v2, interval,
-                 state);
+    const Voltage deviation_v = Errors::with_error(state, innovation_v);
+    for (int k = constants.bank_points(); k > 0 && bank_.open(); --k)
+      bank_.update(cell, input, constants, soc, deviation_v, of_resistances_v2, interval, state);
     if (watched && !bank_.in_background()) {
       contradicted_ = true;
       consistency_.reset();

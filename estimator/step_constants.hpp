@@ -46,7 +46,12 @@ class StepConstants {
   /// The same as resistance_noise() for an overpotential that relaxes: what the cell file knows, and the temperature.
   constexpr const Coupling& known_noise() const { return known_noise_; }
   constexpr const Coupling& relaxing_noise() const { return relaxing_noise_; }
+  /// What the overpotential is wrong by outside of the temperatures of the identification, over what it is wrong by
+  /// inside of them; 1 at most.
+  constexpr const Fraction& extrapolated() const { return extrapolated_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
+  /// Points of the bank that a sample updates: as many as pass in its time at rows of one to two seconds.
+  constexpr int bank_points() const { return bank_points_; }
   constexpr const typename Model::OptionalErrorDecay& error_decay() const { return error_decay_; }
 
   static constexpr std::uint32_t capped(std::uint64_t step_us) {
@@ -59,8 +64,12 @@ class StepConstants {
     const auto correlated_samples = arithmetic::ratio<Count>(noise.model_correlation_s, duration_s_);
     correlated_samples_ = correlated_samples > Count(1) ? correlated_samples : Count(1);
     update_resistance_noise();
-    bank_share_ = correlated_samples > Count(SocBank<S>::points)
-                      ? arithmetic::ratio<Fraction>(Count(2 * SocBank<S>::points), correlated_samples)
+    bank_points_ = 1;
+    for (std::uint32_t us = capped(step_us) / 2; us >= 1'000'000 && bank_points_ < 2 * SocBank<S>::points; us /= 2)
+      bank_points_ = static_cast<std::uint8_t>(2 * bank_points_);
+    const int turn = 2 * SocBank<S>::points / bank_points_;  // samples
+    bank_share_ = correlated_samples > Count(turn) * Fraction(0.5)
+                      ? arithmetic::ratio<Fraction>(Count(turn), correlated_samples)
                       : Fraction(SocBank<S>::max_share);
     const Soc white = accumulated_soc(noise.white_soc_per_s);
     soc_noise_ = Errors::soc_noise(Variance(white * white), noise, duration_s_);
@@ -74,11 +83,16 @@ class StepConstants {
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     known_error_ = Coupling(cell.noise.resistance_error);
     Coupling unknown(0);
+    extrapolated_ = Fraction(0);
     if (measurement::temperature_possible(cdegc)) {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
-      if (laws_of(cell).resistances_follow_temperature())
-        known_error_ = Coupling(known_error_ + extrapolation_error(cell.noise.identified, cdegc, c));
-      else if (cdegc != cell.reference.cdegc)
+      if (laws_of(cell).resistances_follow_temperature()) {
+        const Coupling more = extrapolation_error(cell.noise.identified, cdegc, c);
+        if (more > Coupling(0))
+          extrapolated_ =
+              more < known_error_ ? arithmetic::ratio<Fraction>(Variance(more), Variance(known_error_)) : Fraction(1);
+        known_error_ = Coupling(known_error_ + more);
+      } else if (cdegc != cell.reference.cdegc)
         unknown = arithmetic::magnitude(Coupling(
             model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c, c) - Factor(1)));
     }
@@ -98,6 +112,12 @@ class StepConstants {
   constexpr Soc unknown_charge(const Cell& cell, const Current& counted_a) const {
     return accumulated_soc(
         Soc(cell.noise.unknown_soc_per_s + arithmetic::magnitude(Soc(counted_a * cell.limits.soc_per_as))));
+  }
+  /// SOC by which a current, >= 0, moves the cell in a step of longest_step_us at most; 1 at most.
+  template <class Cell>
+  constexpr Soc charge_of(const Cell& cell, const Current& current_a) const {
+    const Soc most(1), moved = Soc(current_a * cell.limits.soc_per_as) * duration_s_;
+    return moved < most ? moved : most;
   }
 
  private:
@@ -139,7 +159,8 @@ class StepConstants {
   Variance soc_noise_{};
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
-  Fraction bank_share_{};
+  Fraction bank_share_{}, extrapolated_{};
+  std::uint8_t bank_points_ = 1;
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
   Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };

@@ -17,10 +17,38 @@ TEST(Consistency, ADeviationThatLastsIsFoundAsAMeanOverHalfAnHourWouldFindIt) {
   const double expected_v2 = 0.010 * 0.010;
   int seconds = 0;
   while (!monitor.is_inconsistent(expected_v2, share)) {
-    monitor.add(0.05, 0, share);
+    monitor.add(0.045, 0, share);
     ++seconds;
   }
-  EXPECT_NEAR(seconds, -1'800 * std::log(1 - 0.6), 5) << "an exponential mean of 50 mV reaches 30 mV";
+  EXPECT_NEAR(seconds, -1'800 * std::log(1 - 2.0 / 3), 5) << "an exponential mean of 45 mV reaches 30 mV";
+}
+
+/// Seconds until a deviation is inconsistent whose readings are all wrong but one in `one_good_in`; 0: not in an hour.
+int found_after_s(double deviation_v, int one_good_in) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 3'600; ++k) {
+    monitor.add(k % one_good_in == one_good_in - 1 ? 0 : deviation_v, 0, share);
+    if (monitor.is_inconsistent(0.010 * 0.010, share)) return k;
+  }
+  return 0;
+}
+
+TEST(Consistency, AVoltageThatStaysFarOffForMinutesNeedNotWaitForTheMean) {
+  EXPECT_NEAR(found_after_s(0.055, 10'000), 180, 2) << "the mean would need 24 min";
+  EXPECT_GT(found_after_s(0.055, 100), 1'200) << "the voltage comes back: the mean decides";
+}
+
+TEST(Consistency, ACheckThatNothingSuspectedEndsAFarDeviation) {
+  Consistency<double> monitor;
+  for (int k = 0; k < 170; ++k) {
+    monitor.add(0.055, 0, share);
+    EXPECT_FALSE(monitor.is_inconsistent(0.010 * 0.010, share));
+  }
+  monitor.add(0, 0, share);  // is not even judged
+  for (int k = 0; k < 20; ++k) {
+    monitor.add(0.055, 0, share);
+    EXPECT_FALSE(monitor.is_inconsistent(0.010 * 0.010, share));
+  }
 }
 
 TEST(Consistency, ADeviationInsideItsSigmaIsNeverInconsistent) {

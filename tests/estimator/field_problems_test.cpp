@@ -152,5 +152,71 @@ TEST(Complaint, TheSignOfTheCurrentIsLost) {
   EXPECT_NE(flags & (voltage_rejected | soc_ambiguous), 0U) << "the voltage contradicts, and it is said";
 }
 
+/// A log with a row every row_s seconds.
+struct Log {
+  Log(double capacity_ah, double soc, double row, bool last)
+      : cell({.capacity_ah = capacity_ah}, {.soc = soc, .v_rc_v = 0, .temperature_c = 25}),
+        row_s(row),
+        last_value(last),
+        estimator(starting_at(soc, 0.01)) {}
+
+  /// One row. load_a(): the current of the next second. last_value: the row has the last current instead of the mean.
+  template <class Load>
+  void row(Load&& load_a) {
+    double sum_as = 0, current_a = 0;
+    for (int k = 0; k < static_cast<int>(row_s); ++k) {
+      current_a = load_a();
+      cell.run(current_a, 25, 1);
+      sum_as += current_a;
+    }
+    time_us += static_cast<std::uint64_t>(1e6 * row_s);
+    estimate = estimator.step(
+        tables, {time_us, micro(last_value ? current_a : sum_as / row_s), micro(cell.voltage_v()), 2'500});
+  }
+  double error() const { return estimate.soc - cell.soc(); }
+
+  plant::Cell cell;
+  double row_s;
+  bool last_value;
+  model::Cell<float, model::max_intervals> tables = tests::prepared<float>();
+  SocEstimator<float> estimator;
+  Estimate<float> estimate;
+  std::uint64_t time_us = 0;
+};
+
+TEST(Complaint, AnEmptyCellReadsAQuarterFullInALogOfFewRows) {
+  for (const double row_s : {1.0, 5.0, 10.0, 30.0, 60.0}) {
+    for (const bool last_value : {false, true}) {
+      Log log(0.72 * 6, 1, row_s, last_value);  // 28 % less than its file
+      while (log.cell.soc() > 0.02) log.row([] { return -3.0; });
+      for (double rested_s = 0; rested_s < 900; rested_s += row_s) log.row([] { return 0.0; });
+      EXPECT_LT(log.estimate.soc, 0.05) << row_s << ", last " << last_value;
+    }
+  }
+}
+
+TEST(Complaint, ALogOfEveryTenthCurrentIsCountedAsIfItWereAll) {
+  int inside = 0, rows = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U, 5U, 6U, 7U, 8U}) {
+    plant::Random random{seed};
+    Log log(6, 0.6, 10, true);
+    for (; log.time_us < 7'200'000'000; ++rows) {
+      log.row([&] { return random.uniform() < 0.5 ? -6.0 : 6.0; });
+      inside += std::abs(log.error()) <= 2 * log.estimate.soc_sigma ? 1 : 0;
+    }
+  }
+  EXPECT_GT(inside, 0.9 * rows);
+}
+
+TEST(Complaint, AConstantLoadHidesNothingBetweenRareRows) {
+  double sigma[2];
+  for (const int rare : {0, 1}) {
+    Log log(6, 0.6, rare != 0 ? 60 : 1, true);
+    while (log.time_us < 3'600'000'000) log.row([] { return -1.0; });
+    sigma[rare] = log.estimate.soc_sigma;
+  }
+  EXPECT_NEAR(sigma[1], sigma[0], 0.2 * sigma[0]);
+}
+
 }  // namespace
 }  // namespace bms::estimator

@@ -1,6 +1,8 @@
 #include "estimator/step_constants.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -27,6 +29,22 @@ TEST(StepConstants, AnErrorThatPersistsCountsOncePerItsCorrelationTime) {
   EXPECT_EQ(c.correlated_samples(), 1) << "a step longer than the correlation time is one sample";
 }
 
+TEST(StepConstants, ATurnOfTheBankTakesMinutesAtAnyInterval) {
+  const auto cell = tests::prepared<double>();
+  Constants<double> c;
+  for (const double step_s : {0.1, 1.0, 1.9}) {
+    c.set_time_step(cell.noise, static_cast<std::uint64_t>(1e6 * step_s));
+    EXPECT_EQ(c.bank_points(), 1) << step_s;
+  }
+  for (const double step_s : {2.0, 5.0, 10.0, 30.0, 60.0, 127.0, 300.0, 3'600.0}) {
+    c.set_time_step(cell.noise, static_cast<std::uint64_t>(1e6 * step_s));
+    const int samples = 2 * SocBank<double>::points / c.bank_points();
+    EXPECT_EQ(samples * c.bank_points(), 2 * SocBank<double>::points) << step_s << ": ends with a sample";
+    EXPECT_LE(samples * step_s, std::max(256.0, step_s)) << step_s;
+    EXPECT_DOUBLE_EQ(c.bank_share(), std::min(samples * step_s / cell.noise.model_correlation_s, 1.9)) << step_s;
+  }
+}
+
 TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
   const auto cell = tests::prepared<double>();
   Constants<double> c;
@@ -38,6 +56,10 @@ TEST(StepConstants, AStepLongerThanItsTypeIsCutButItsUnknownChargeIsNot) {
   EXPECT_DOUBLE_EQ(c.unknown_charge(cell, -3.0), rate + 3.0 / 6 / 3'600);
   c.set_time_step(cell.noise, 86'400'000'000);
   EXPECT_EQ(c.unknown_charge(cell, 6.0), 1) << "not more than the capacity";
+  EXPECT_DOUBLE_EQ(c.charge_of(cell, 3.0), 3.0 * 4'095 / 6 / 3'600);
+  c.set_time_step(cell.noise, ~std::uint64_t{0});
+  EXPECT_EQ(c.charge_of(cell, 0.0), 0) << "at once";
+  EXPECT_EQ(c.charge_of(cell, 12.0), 1);
 }
 
 TEST(StepConstants, ColdAndHeatMakeResistancesUncertainThatFollowNoTemperature) {
@@ -88,9 +110,13 @@ TEST(StepConstants, ACellThatFollowsTheTemperatureIsUncertainOutsideOfItsIdentif
   for (const double celsius : {0.0, 25.0, 40.0}) {
     c.set_temperature(cell, static_cast<std::int16_t>(100 * celsius));
     EXPECT_DOUBLE_EQ(c.resistance_error(), cell.noise.resistance_error) << celsius;
+    EXPECT_EQ(c.extrapolated(), 0) << celsius;
   }
+  c.set_temperature(cell, -10);
+  EXPECT_NEAR(c.extrapolated(), 0.2 * (1 / 273.05 - 1 / 273.15) / k_ev / cell.noise.resistance_error, 1e-5);
   c.set_temperature(cell, -2'000);
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 253.15 - 1 / 273.15) / k_ev, 1e-5);
+  EXPECT_EQ(c.extrapolated(), 1) << "ten times what it is wrong by inside";
   c.set_temperature(cell, 6'000);
   EXPECT_NEAR(c.resistance_error(), cell.noise.resistance_error + 0.2 * (1 / 313.15 - 1 / 333.15) / k_ev, 1e-5);
 }
