@@ -140,7 +140,7 @@ class Days {
     world_.vehicle.request = Request::drive;
     if (which >= 0.3 && which < 0.45) {
       world_.run_ms(between(0, 4'000));
-      dip();
+      world_.run_ms(dip() + 100);
     }
     if (which < 0.3) {
       world_.run_until([&] { return closed() || world_.vehicle.faults() != 0; }, 8'000);
@@ -215,7 +215,7 @@ class Days {
 
   /// With a converter or a fan that runs on: the contactors open after a minute, and the fault ends by itself.
   void turn_off() {
-    const double standby_a = chance(0.4) ? between(5, 10) : 0;
+    const double standby_a = chance(0.4) && closed() ? between(5, 10) : 0;
     begin(standby_a > 0 ? "key off with 5 to 10 A that flow on" : "key off", standby_a > 0 ? unrequested : 0);
     if (standby_a > 0) {  // flows before the key is turned, too
       set_drive_a(world_, -standby_a);
