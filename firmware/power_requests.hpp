@@ -6,6 +6,8 @@
 //
 //   1. A stop (frame Stop) ends the request of every source until that source asks again: it has to ask for nothing
 //      first. A source that only goes on is not followed, nor is anything that arrives with the same sample.
+//      Of a request 0 and a request for power with the same sample the order is not known (hal/request_queue.hpp):
+//      request 0 wins, and the truck, which repeats its request, is followed with the next one.
 //   2. A truck does not drive while a charger is present (EN 1175): then neither is followed.
 //   3. The truck's request, then the charger's.
 //
@@ -33,18 +35,21 @@ class PowerRequests {
 
   constexpr void stop(std::uint64_t now_us) {
     stopped_.fill(true);
-    refuse_until_after(now_us);
+    stopped_us_ = now_us;
+    any_stop_ = true;
   }
   /// The truck asks for nothing.
   constexpr void withdraw(std::uint64_t now_us) {
     truck_ = Request::none;
     stopped_[truck] = false;
-    refuse_until_after(now_us);
+    withdrawn_us_ = now_us;
+    any_withdrawn_ = true;
   }
   /// The truck asks and may. Returns false if a stop stands against it.
   constexpr bool ask(Request wanted, std::uint64_t now_us) {
-    if (truck_request(now_us) == Request::none) stopped_[truck] = false;
-    if (refuses_ && refused_us_ == now_us) stopped_[truck] = true;
+    const bool stopped_now = any_stop_ && stopped_us_ == now_us;
+    if (any_withdrawn_ && withdrawn_us_ == now_us && !stopped_now) return false;
+    if (truck_request(now_us) == Request::none) stopped_[truck] = stopped_now;
     truck_ = wanted;
     asked_us_ = now_us;
     return !stopped_[truck];
@@ -67,15 +72,10 @@ class PowerRequests {
   constexpr Request truck_request(std::uint64_t now_us) const {
     return now_us - asked_us_ < timeout_us ? truck_ : Request::none;
   }
-  constexpr void refuse_until_after(std::uint64_t now_us) {
-    refuses_ = true;
-    refused_us_ = now_us;
-  }
-
   std::array<bool, sources> stopped_{};  ///< by a stop, since when the source has not asked for nothing
   Request truck_ = Request::none;
-  std::uint64_t asked_us_ = 0, refused_us_ = 0;  ///< refused_us_: nothing that arrives with this sample is followed
-  bool refuses_ = false;
+  std::uint64_t asked_us_ = 0, stopped_us_ = 0, withdrawn_us_ = 0;  ///< of the newest of each kind
+  bool any_stop_ = false, any_withdrawn_ = false;
 };
 
 }  // namespace bms::firmware

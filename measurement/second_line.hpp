@@ -12,7 +12,7 @@ enum SecondLineTrip : std::uint32_t {
   charge_overcurrent = 4,
   discharge_overcurrent = 8,
   short_circuit = 16,
-  temperature = 32,
+  temperature = 32,   ///< a state: it lasts as long as the pack is hot or cold, and ends by itself
   host_silence = 64,  ///< the chip had no host or no settings for a time: it was silent to it, was reset or configured
   permanent_failure = 128,
   pins_wrong = 256,  ///< the enable outputs do not follow the protections

@@ -251,9 +251,12 @@ class Protection {
   }
 
   /// Trips since the last call. A short circuit counts as the largest current, because it may be over before a reading.
+  /// A temperature is a state of the pack and not a trip: the rows of the temperatures say the same before, and a pack
+  /// that is stored in the cold must not need a clear command.
   constexpr void update_second_line(Quantities& q) {
     constexpr std::uint32_t failures = measurement::permanent_failure | measurement::pins_wrong;
-    at(q, Quantity::second_line_trips) = (second_line_ & ~(failures | measurement::short_circuit)) != 0;
+    at(q, Quantity::second_line_trips) =
+        (second_line_ & ~(failures | measurement::short_circuit | measurement::temperature)) != 0;
     at(q, Quantity::second_line_broken) = (second_line_ & failures) != 0;
     if ((second_line_ & measurement::short_circuit) != 0)
       at(q, Quantity::current_magnitude_ua) = std::numeric_limits<std::int32_t>::max();

@@ -38,6 +38,10 @@ struct Board {
   double high_overcurrent_a, high_overcurrent_delay_s;  ///< discharge only; the same steps
   double short_circuit_a;                               ///< discharge only; steps of the table below
   double short_circuit_delay_us = 450;                  ///< 15 to 450
+  // Mean of 250 ms and the four thermistors; whole seconds up to 255, whole degrees C.
+  double sustained_a = 400, sustained_delay_s = 20;  ///< discharge only; a current that is within the reading's range
+  int charge_hot_c = 120, discharge_hot_c = 120, charge_cold_c = -40;
+  std::uint8_t temperature_delay_s = 20;
   std::uint16_t host_silence_s = 3;
 };
 
@@ -51,13 +55,20 @@ constexpr double current_end_a(const Board& b) {
   return std::min({32'767e-6 * current_step_ua(b), 200 / b.shunt_mohm, 2'100.0});
 }
 
-inline constexpr std::int32_t voltage_step_uv = 10'000;      // userV
-inline constexpr std::uint8_t crc_over_i2c = 0x11;           // Comm Type: 400 kHz, CRC
+inline constexpr std::int32_t voltage_step_uv = 10'000;  // userV
+// Comm Type: CRC above 100 kHz. 0x11 is CRC up to 100 kHz (SLUUCG7 and SLUUBY1B, data memory); the bus has 400 kHz.
+inline constexpr std::uint8_t crc_over_fast_i2c = 0x12;
 inline constexpr std::uint16_t default_alarm_mask = 0xF882;  // factory value and the end of each scan
 
 // Faults that turn DSG and CHG off [13.3.3]: registers A and C. With these values of A they act at once.
 inline constexpr std::uint8_t dsg_faults_a = 0xE4, dsg_faults_c = 0xE2;  // SCD, OCD2, OCD1, CUV; OCD3, SCDL, OCDL, HWDF
 inline constexpr std::uint8_t chg_faults_a = 0x98, chg_faults_c = 0x56;  // SCD, OCC, COV; SCDL, COVL, PTO, HWDF
+// Those of the temperatures, register B: OTF, OTINT, OTD, UTINT, UTD; OTF, OTINT, OTC, UTINT, UTC. The factory values.
+inline constexpr std::uint8_t dsg_faults_b = 0xE6, chg_faults_b = 0xD5;
+// Enabled Protections. What is off stands with its reason in docs/safety/assumptions.md, L-24.
+inline constexpr std::uint8_t enabled_protections_a = 0xFC;  // SCD, OCD2, OCD1, OCC, COV, CUV
+inline constexpr std::uint8_t enabled_protections_b = 0x31;  // OTD, OTC, UTC
+inline constexpr std::uint8_t enabled_protections_c = 0xC2;  // OCD3, SCDL, HWDF
 
 // ---- settings ----
 
@@ -90,14 +101,12 @@ constexpr std::uint32_t short_circuit_step(const Board& b) {
 
 inline constexpr std::uint32_t most_charge_steps = 62, most_discharge_steps = 100;  // OCC; OCD1 and OCD2
 
-/// SCD, COV, CUV; an overcurrent only if its comparator reaches the threshold.
-constexpr std::uint32_t enabled_protections_a(const Board& b) {
-  std::uint32_t enabled = 0x8C;
-  if (shunt_steps(b, b.overcurrent_a) <= most_charge_steps) enabled |= 0x10;
-  if (shunt_steps(b, b.overcurrent_a) <= most_discharge_steps) enabled |= 0x20;
-  if (shunt_steps(b, b.high_overcurrent_a) <= most_discharge_steps) enabled |= 0x40;
-  return enabled;
+/// Of OCD3: minus the current in userA.
+constexpr std::uint32_t minus_user_a(const Board& b, double a) {
+  return 0x10000 - nearest(1e6 * a / current_step_ua(b));
 }
+constexpr std::uint32_t byte_of(int celsius) { return static_cast<std::uint8_t>(celsius); }
+inline constexpr int temperature_hysteresis_c = 3;
 
 }  // namespace detail
 
@@ -113,18 +122,19 @@ constexpr auto settings(const Board& b) {
   return std::array{
       Setting{0x91A8, 4, floating(cc_gain)},                 // CC Gain
       Setting{0x91AC, 4, floating(cc_gain * 298'261.6178)},  // Capacity Gain [4.12]
-      Setting{0x9234, 2, 0x28C2},        // Power Config: no SLEEP; FASTADC: all cells in 31.5 ms, stack and LD in 94.5
-      Setting{0x9236, 1, 0x0D},          // REG12 Config: REG1 at 3.3 V, for the pins below
-      Setting{0x9237, 1, 0x01},          // REG0 Config: the pre-regulator of REG1
-      Setting{0x9239, 1, crc_over_i2c},  // Comm Type
-      Setting{0x925F, 2, 0x0002},        // Protection Configuration: no latch ends by a current
-      Setting{0x9261, 1, enabled_protections_a(b)}, Setting{0x9262, 1, 0x00},  // Enabled Protections B: no temperatures
-      Setting{0x9263, 1, 0x42},                                                // C: host watchdog, latch of SCD
-      Setting{0x9265, 1, chg_faults_a},                                        // CHG FET Protections A
-      Setting{0x9267, 1, chg_faults_c},                                        // C
-      Setting{0x9269, 1, dsg_faults_a},                                        // DSG FET Protections A
-      Setting{0x926B, 1, dsg_faults_c},                                        // C
-      Setting{0x926D, 2, default_alarm_mask},                                  // Default Alarm Mask
+      Setting{0x9234, 2, 0x28C2},  // Power Config: no SLEEP; FASTADC: all cells in 31.5 ms, stack and LD in 94.5
+      Setting{0x9236, 1, 0x0D},    // REG12 Config: REG1 at 3.3 V, for the pins below
+      Setting{0x9237, 1, 0x01},    // REG0 Config: the pre-regulator of REG1
+      Setting{0x9239, 1, crc_over_fast_i2c},  // Comm Type
+      // Shutdown Temperature: the factory value 85 degrees C of the die opens main plus under load, and only LD or TS2
+      // ends SHUTDOWN
+      Setting{0x9244, 1, 110}, Setting{0x925F, 2, 0x0002},  // Protection Configuration: no latch ends by a current
+      Setting{0x9261, 1, enabled_protections_a}, Setting{0x9262, 1, enabled_protections_b},
+      Setting{0x9263, 1, enabled_protections_c}, Setting{0x9265, 1, chg_faults_a},  // CHG FET Protections
+      Setting{0x9266, 1, chg_faults_b}, Setting{0x9267, 1, chg_faults_c},
+      Setting{0x9269, 1, dsg_faults_a},  // DSG FET Protections
+      Setting{0x926A, 1, dsg_faults_b}, Setting{0x926B, 1, dsg_faults_c},
+      Setting{0x926D, 2, default_alarm_mask},                                          // Default Alarm Mask
       Setting{0x9275, 1, static_cast<std::uint32_t>(b.undervoltage_v / cell_step_v)},  // CUV Threshold
       Setting{0x9276, 2, comparator_delay(b.voltage_delay_s)},                         // CUV Delay
       Setting{0x9278, 1, at_least(b.overvoltage_v / cell_step_v)},                     // COV Threshold
@@ -137,9 +147,19 @@ constexpr auto settings(const Board& b) {
       Setting{0x9285, 1, comparator_delay(b.high_overcurrent_delay_s)},                // OCD2 Delay
       Setting{0x9286, 1, short_circuit_step(b)},                                       // SCD Threshold
       Setting{0x9287, 1, nearest(b.short_circuit_delay_us / 15) + 1},                  // SCD Delay
-      Setting{0x9288, 2, rest_ma},           // OCC Recovery Threshold: at rest; the default needs a load
-      Setting{0x928D, 2, minus_rest_ma},     // OCD Recovery Threshold: at rest; the default needs a charger
-      Setting{0x9295, 1, 1},                 // SCDL Latch Limit: the first short circuit is latched until a command
+      Setting{0x9288, 2, rest_ma},                         // OCC Recovery Threshold: at rest; the default needs a load
+      Setting{0x928A, 2, minus_user_a(b, b.sustained_a)},  // OCD3 Threshold [13.6.6]
+      Setting{0x928C, 1, nearest(b.sustained_delay_s)},    // OCD3 Delay
+      Setting{0x928D, 2, minus_rest_ma},  // OCD Recovery Threshold: at rest; the default needs a charger
+      Setting{0x9295, 1, 1},              // SCDL Latch Limit: the first short circuit is latched until a command
+      Setting{0x929A, 1, byte_of(b.charge_hot_c)},  // OTC Threshold, Delay, Recovery [13.6.8]
+      Setting{0x929B, 1, b.temperature_delay_s}, Setting{0x929C, 1, byte_of(b.charge_hot_c - temperature_hysteresis_c)},
+      Setting{0x929D, 1, byte_of(b.discharge_hot_c)},  // OTD
+      Setting{0x929E, 1, b.temperature_delay_s},
+      Setting{0x929F, 1, byte_of(b.discharge_hot_c - temperature_hysteresis_c)},
+      Setting{0x92A6, 1, byte_of(b.charge_cold_c)},  // UTC
+      Setting{0x92A7, 1, b.temperature_delay_s},
+      Setting{0x92A8, 1, byte_of(b.charge_cold_c + temperature_hysteresis_c)},
       Setting{0x92AF, 1, 3},                 // Recovery Time [s]: the firmware has opened its outputs long before
       Setting{0x92B2, 2, b.host_silence_s},  // HWD Delay
       Setting{0x92FA, 1, 0x07},              // CFETOFF Pin Config: cell thermistor, 18 kohm pull-up
@@ -177,7 +197,8 @@ constexpr bool possible(const Board& b) {
     return value_of(all, address) >= least && value_of(all, address) <= most;
   };
   return between(0x9275, 20, 90) && between(0x9276, 1, 2'047) && between(0x9278, 20, 110) &&
-         between(0x9279, 1, 2'047) && between(0x9281, 1, 127) && between(0x9285, 1, 127) && between(0x9287, 1, 31) &&
+         between(0x9279, 1, 2'047) && b.sustained_a <= current_end_a(b) && between(0x9281, 1, 127) &&
+         between(0x9285, 1, 127) && between(0x9287, 1, 31) &&
          short_circuit_mv[value_of(all, 0x9286)] >= b.short_circuit_a * b.shunt_mohm - 1e-6 &&
          current_end_a(b) >= b.current_range_a && b.overvoltage_v > b.undervoltage_v;
 }

@@ -95,7 +95,7 @@ class FrontEnd {
   bool read_current(measurement::PackSample<cell_inputs>& into);
   std::int32_t current_ua(std::int32_t counts, std::int16_t steps);
   bool read_second_line();
-  bool pins_follow(std::uint8_t safety_a, std::uint8_t safety_c, std::uint8_t fets);
+  bool pins_follow(std::uint8_t safety_a, std::uint8_t safety_b, std::uint8_t safety_c, std::uint8_t fets);
   bool refresh_balancing();
   void rest();
   void reset_measurement();

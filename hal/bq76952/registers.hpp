@@ -28,7 +28,7 @@ inline constexpr std::uint16_t cells_scanned = 1U << 1, all_scanned = 1U << 7, t
                                tripped_bc = 1U << 15;
 
 // bits of Safety Status A: CUV 2, COV 3, OCC 4, OCD1 5, OCD2 6, SCD 7; of C:
-inline constexpr std::uint8_t host_watchdog = 1U << 1, short_circuit_latch = 1U << 6;
+inline constexpr std::uint8_t host_watchdog = 1U << 1, short_circuit_latch = 1U << 6, sustained_overcurrent = 1U << 7;
 
 // bits of fet_status: the pins assert a fault
 inline constexpr std::uint8_t dchg_asserted = 1U << 4, ddsg_asserted = 1U << 5;

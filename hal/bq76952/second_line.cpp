@@ -22,6 +22,7 @@ bool FrontEnd::read_second_line() {
   const std::uint8_t a = safety[0], b = safety[2], c = safety[4];
   trips_ |= (a >> 2 & 0x0FU) | (a >> 3 & (discharge_overcurrent | short_circuit));
   if (b != 0) trips_ |= temperature;
+  if ((c & sustained_overcurrent) != 0) trips_ |= discharge_overcurrent;
   if ((c & host_watchdog) != 0) trips_ |= host_silence;
   const bool latched = (c & short_circuit_latch) != 0;
   if (latched && !latched_) trips_ |= short_circuit;
@@ -34,7 +35,7 @@ bool FrontEnd::read_second_line() {
   alarm_ = 0;
   safety_a_ = a;
   safety_bc_ = b | c;
-  if (pins_follow(a, c, fets[0]) || b != 0)
+  if (pins_follow(a, b, c, fets[0]))
     pins_wrong_ = 0;
   else if (pins_wrong_ < max_pins_wrong)
     ++pins_wrong_;
@@ -43,13 +44,14 @@ bool FrontEnd::read_second_line() {
   return true;
 }
 
-/// Returns true if DDSG and DCHG are what the protections demand. Protections of register B are off.
-bool FrontEnd::pins_follow(std::uint8_t safety_a, std::uint8_t safety_c, std::uint8_t fets) {
-  const auto asserted = [&](std::uint8_t faults_a, std::uint8_t faults_c) {
-    return failed_permanently_ || (safety_a & faults_a) != 0 || (safety_c & faults_c) != 0;
+/// Returns true if DDSG and DCHG are what the protections demand.
+bool FrontEnd::pins_follow(std::uint8_t safety_a, std::uint8_t safety_b, std::uint8_t safety_c, std::uint8_t fets) {
+  const auto asserted = [&](std::uint8_t faults_a, std::uint8_t faults_b, std::uint8_t faults_c) {
+    return failed_permanently_ || (safety_a & faults_a) != 0 || (safety_b & faults_b) != 0 ||
+           (safety_c & faults_c) != 0;
   };
-  return asserted(dsg_faults_a, dsg_faults_c) == ((fets & ddsg_asserted) != 0) &&
-         asserted(chg_faults_a, chg_faults_c) == ((fets & dchg_asserted) != 0);
+  return asserted(dsg_faults_a, dsg_faults_b, dsg_faults_c) == ((fets & ddsg_asserted) != 0) &&
+         asserted(chg_faults_a, chg_faults_b, chg_faults_c) == ((fets & dchg_asserted) != 0);
 }
 
 }  // namespace bms::hal::bq76952

@@ -210,6 +210,10 @@ void I2cControllerModel::write(std::uint32_t offset, std::uint32_t value, double
       return;
     case 0x1C:
       ccr = value;
+      if ((ccr & 0xFFF) != 0) {  // RM0090, 27.6.8: F/S and DUTY
+        const double fast_periods = (ccr >> 14 & 1) == 0 ? 3 : 25, periods = (ccr >> 15 & 1) == 0 ? 2 : fast_periods;
+        chip_.bus_hz = 1e6 * frequency_mhz / (periods * (ccr & 0xFFF));
+      }
       return;
     case 0x20:
       trise = value;

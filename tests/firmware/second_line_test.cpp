@@ -22,7 +22,12 @@ constexpr double period_s = 0.1;
 
 struct Chip {
   constexpr explicit Chip(const model::Limits& limits, double capacity_ah, std::uint8_t cells = 16)
-      : pack{.limits = limits, .capacity_ah = capacity_ah, .cells = cells, .temperatures = 4},
+      : pack{.limits = limits,
+             .capacity_ah = capacity_ah,
+             .cells = cells,
+             .temperatures = 4,
+             .sample_period_s = period_s,
+             .current_range_a = 2'000},
         rules(protection::rules_of(protection::protection_table(pack))),
         board(front_end_board(pack, rules)),
         settings(hal::bq76952::settings(board)),
@@ -31,7 +36,8 @@ struct Chip {
   constexpr bool wider_and_slower() const {
     return overvoltage_is_wider_and_slower(line, rules, period_s) &&
            undervoltage_is_wider_and_slower(line, rules, period_s) &&
-           overcurrent_is_wider_and_slower(line, rules, period_s) && host_silence_is_slower(line, rules) &&
+           overcurrent_is_wider_and_slower(line, rules, pack) && sustained_is_wider_and_slower(line, rules, pack) &&
+           temperatures_are_wider_and_slower(line, rules) && line.all_on && host_silence_is_slower(line, rules) &&
            current_is_in_range(board, rules) && hal::bq76952::possible(board);
   }
   constexpr std::uint32_t at(std::uint16_t address) const { return hal::bq76952::value_of(settings, address); }
@@ -62,6 +68,12 @@ constexpr model::Limits lfp_200ah{.voltage_min_v = 2.5,
                                   .temperature_min_c = -20,
                                   .temperature_max_c = 60};
 
+constexpr model::Limits lfp(double current_a) {
+  model::Limits limits = lfp_200ah;
+  limits.charge_current_max_a = limits.discharge_current_max_a = current_a;
+  return limits;
+}
+
 constexpr Chip table9(tests::table9.limits, tests::table9.capacity_ah), a123(tests::a123_26650.limits, 2.58),
     of_nmc(nmc, 50), of_lto(lto, 30), of_lfp_200ah(lfp_200ah, 200);
 static_assert(table9.wider_and_slower());
@@ -69,6 +81,8 @@ static_assert(a123.wider_and_slower());
 static_assert(of_nmc.wider_and_slower());
 static_assert(of_lto.wider_and_slower());
 static_assert(of_lfp_200ah.wider_and_slower());
+static_assert(Chip(lfp(206), 206).wider_and_slower() && Chip(lfp(210), 210).wider_and_slower());
+static_assert(Chip(lfp(280), 280).wider_and_slower() && Chip(lfp(400), 400).wider_and_slower());
 
 TEST(SecondLineOfTheFrontEnd, FollowsTheVoltagesOfTheCell) {
   // 3.65 + 0.165 + 0.02 V in steps of 50.6 mV: 75.8; 0.75 * 2.0 - 0.02 V: 29.2
@@ -104,31 +118,131 @@ TEST(SecondLineOfTheFrontEnd, FollowsTheCurrentsOfTheCell) {
   EXPECT_NEAR(of_lfp_200ah.line.high_overcurrent_s, 0.35, 0.002);
 }
 
-/// The table in the README of the driver, which is written by hand.
-TEST(SecondLineOfTheFrontEnd, IsThatOfTheReadme) {
-  std::ifstream file(BMS_SOURCE_DIR "/hal/bq76952/README.md");
-  const std::string page{std::istreambuf_iterator<char>(file), {}};
-  const auto has = [&](const char* row, double threshold, double delay) {
-    char text[100];
-    std::snprintf(text, sizeof text, row, threshold, delay);
-    EXPECT_NE(page.find(text), page.npos) << text;
+/// The table in the README of the driver, for packs of LFP cells whose limit is 1C.
+std::string table_of_packs() {
+  const std::array packs{Chip(tests::table9.limits, tests::table9.capacity_ah), Chip(lfp(100), 100),
+                         Chip(lfp(200), 200), Chip(lfp(280), 280), Chip(lfp(400), 400)};
+  std::string text;
+  const auto row = [&](const char* start, const char* number, auto&& value, const char* end) {
+    text += start;
+    for (const Chip& chip : packs) {
+      char cell[30];
+      std::snprintf(cell, sizeof cell, number, value(chip.line));
+      text += cell;
+    }
+    text += end;
   };
-  const SecondLine& line = table9.line;
-  has("| COV | DCHG | %.3f V | %.1f s |", line.overvoltage_v, line.overvoltage_s);
-  has("| CUV | DDSG | %.3f V | %.1f s |", line.undervoltage_v, line.undervoltage_s);
-  has("| OCC | DCHG | %.0f A | %.2f s |", line.charge_overcurrent_a, line.charge_overcurrent_s);
-  has("| OCD1 | DDSG | %.0f A | %.2f s |", line.overcurrent_a, line.overcurrent_s);
-  has("| OCD2 | DDSG | %.0f A | %.2f s |", line.high_overcurrent_a, line.high_overcurrent_s);
-  has("| SCD | both | %.0f A | %.2f ms |", line.short_circuit_a, 0.45);
+  using L = SecondLine;
+  row(
+      "| COV | DCHG |", " %.3f V |", [](const L& l) { return l.overvoltage_v; }, " 1.0 s |\n");
+  row(
+      "| CUV | DDSG |", " %.3f V |", [](const L& l) { return l.undervoltage_v; }, " 1.0 s |\n");
+  row(
+      "| OCC | DCHG |", " %.0f A |", [](const L& l) { return l.charge_overcurrent_a; }, " 0.42 s |\n");
+  row(
+      "| OCD1 | DDSG |", " %.0f A |", [](const L& l) { return l.overcurrent_a; }, " 0.42 s |\n");
+  row(
+      "| OCD2 | DDSG |", " %.0f A |", [](const L& l) { return l.high_overcurrent_a; }, " 0.35 s |\n");
+  row(
+      "| OCD3 | DDSG |", " %.0f A |", [](const L& l) { return l.sustained_a; }, " 20 s |\n");
+  row(
+      "| SCD | both |", " %.0f A |", [](const L& l) { return l.short_circuit_a; }, " 0.45 ms |\n");
+  row(
+      "| OTC | DCHG |", " %d °C |", [](const L& l) { return l.charge_hot_c; }, " 20 s |\n");
+  row(
+      "| OTD | DDSG |", " %d °C |", [](const L& l) { return l.discharge_hot_c; }, " 20 s |\n");
+  row(
+      "| UTC | DCHG |", " %d °C |", [](const L& l) { return l.charge_cold_c; }, " 20 s |\n");
+  return text;
 }
 
-TEST(SecondLineOfTheFrontEnd, AnOvercurrentBeyondTheComparatorIsLeftToTheOthers) {
-  model::Limits limits = lfp_200ah;
-  limits.charge_current_max_a = limits.discharge_current_max_a = 300;
-  const Chip chip(limits, 300);
-  // 1,500 A: 1,800 A are 90 steps, OCC ends at 62; 2,250 A are 113 steps, OCD2 ends at 100
-  EXPECT_EQ(chip.at(0x9261), 0xACU) << "SCD, OCD1, COV, CUV";
-  EXPECT_TRUE(chip.wider_and_slower());
+TEST(SecondLineOfTheFrontEnd, IsThatOfTheReadme) {
+  std::ifstream file(BMS_SOURCE_DIR "/hal/bq76952/README.md");
+  const std::string page{std::istreambuf_iterator<char>(file), {}}, table = table_of_packs();
+  EXPECT_NE(page.find(table), page.npos) << "expected there:\n" << table;
+  for (const Chip* chip : {&table9, &of_lfp_200ah}) {
+    EXPECT_NEAR(chip->line.overvoltage_s, 1.0, 0.004);
+    EXPECT_NEAR(chip->line.charge_overcurrent_s, 0.42, 0.002);
+    EXPECT_NEAR(chip->line.high_overcurrent_s, 0.35, 0.002);
+    EXPECT_DOUBLE_EQ(chip->line.sustained_s, 20);
+    EXPECT_DOUBLE_EQ(chip->line.temperature_s, 20);
+  }
+}
+
+/// By hand: five times the limit, and not more than 1,886 A; 2 mV a step at 0.1 mOhm, OCC ends at 62, OCD at 100 steps.
+TEST(SecondLineOfTheFrontEnd, IsOnForEveryPackAndEndsWithItsComparators) {
+  const Chip of_280a(lfp(280), 280), of_400a(lfp(400), 400);
+  for (const Chip* chip : {&table9, &of_lfp_200ah, &of_280a, &of_400a}) {
+    EXPECT_EQ(chip->at(0x9261), 0xFCU) << "SCD, OCD2, OCD1, OCC, COV, CUV";
+    EXPECT_EQ(chip->at(0x9262), 0x31U) << "OTD, OTC, UTC";
+    EXPECT_EQ(chip->at(0x9263), 0xC2U) << "OCD3, SCDL, HWDF";
+  }
+  EXPECT_DOUBLE_EQ(of_280a.line.charge_overcurrent_a, 1'240) << "4.4 times the limit";
+  EXPECT_DOUBLE_EQ(of_280a.line.overcurrent_a, 1'680);
+  EXPECT_DOUBLE_EQ(of_280a.line.high_overcurrent_a, 2'000);
+  EXPECT_DOUBLE_EQ(of_280a.line.sustained_a, 560);
+  EXPECT_DOUBLE_EQ(of_400a.line.charge_overcurrent_a, 1'240) << "3.1 times the limit";
+  EXPECT_DOUBLE_EQ(of_400a.line.overcurrent_a, 2'000);
+  EXPECT_DOUBLE_EQ(of_400a.line.sustained_a, 800);
+  EXPECT_EQ(of_280a.at(0x928A), 0x10000U - 5'600U) << "in steps of 100 mA";
+  EXPECT_EQ(table9.at(0x928A), 0x10000U - 1'200U) << "in steps of 10 mA";
+}
+
+TEST(SecondLineOfTheFrontEnd, FollowsTheTemperaturesOfTheCell) {
+  // charging up to 45, discharging up to 60 degrees C, charging from 0 on
+  EXPECT_EQ(table9.line.charge_hot_c, 50);
+  EXPECT_EQ(table9.line.discharge_hot_c, 65);
+  EXPECT_EQ(table9.line.charge_cold_c, -5);
+  EXPECT_EQ(table9.at(0x92A6), 0xFBU);
+  EXPECT_EQ(table9.at(0x92A8), 0xFEU) << "ends at -2 degrees C";
+}
+
+/// With 0.1 mOhm the comparator of a pack of 420 A would open at less than three times its limit.
+TEST(SecondLineOfTheFrontEnd, APackForWhichAProtectionWouldBeTooNarrowOrOffDoesNotCompile) {
+  EXPECT_FALSE(Chip(lfp(420), 420).wider_and_slower());
+  for (const std::uint16_t enabled : {0x9261, 0x9262, 0x9263, 0x9265, 0x9266, 0x9267, 0x9269, 0x926A, 0x926B}) {
+    auto settings = table9.settings;
+    for (auto& s : settings) {
+      if (s.address == enabled) s.value = 0;
+    }
+    EXPECT_FALSE(second_line(settings, 0.1).all_on) << std::hex << enabled;
+  }
+  hal::bq76952::Board board = table9.board;
+  board.sustained_delay_s = 10;
+  const auto fast = hal::bq76952::settings(board);
+  EXPECT_FALSE(sustained_is_wider_and_slower(second_line(fast, 0.1), table9.rules, table9.pack));
+  board = table9.board;
+  board.charge_hot_c = 46;
+  const auto narrow = hal::bq76952::settings(board);
+  EXPECT_FALSE(temperatures_are_wider_and_slower(second_line(narrow, 0.1), table9.rules));
+}
+
+/// What is off stands in the safety file by its name.
+TEST(SecondLineOfTheFrontEnd, WhatIsOffIsNamedInTheSafetyFile) {
+  struct Protection {
+    const char* name;
+    std::uint16_t enabled;
+    std::uint32_t bit;
+  };
+  // SLUUBY2B and SLUUBY1B, 13.3.3
+  constexpr Protection all[] = {
+      {"CUV", 0x9261, 4},     {"COV", 0x9261, 8},     {"OCC", 0x9261, 0x10}, {"OCD1", 0x9261, 0x20},
+      {"OCD2", 0x9261, 0x40}, {"SCD", 0x9261, 0x80},  {"UTC", 0x9262, 1},    {"UTD", 0x9262, 2},
+      {"UTINT", 0x9262, 4},   {"OTC", 0x9262, 0x10},  {"OTD", 0x9262, 0x20}, {"OTINT", 0x9262, 0x40},
+      {"OTF", 0x9262, 0x80},  {"HWDF", 0x9263, 2},    {"PTO", 0x9263, 4},    {"COVL", 0x9263, 0x10},
+      {"OCDL", 0x9263, 0x20}, {"SCDL", 0x9263, 0x40}, {"OCD3", 0x9263, 0x80}};
+  std::ifstream file(BMS_SOURCE_DIR "/docs/safety/assumptions.md");
+  std::string line, limit;
+  while (std::getline(file, line)) {
+    if (line.rfind("| L-24 |", 0) == 0) limit = line;
+  }
+  int off = 0;
+  for (const Protection& p : all) {
+    const bool on = (table9.at(p.enabled) & p.bit) != 0;
+    off += on ? 0 : 1;
+    EXPECT_EQ(limit.find("`" + std::string(p.name) + "`") == limit.npos, on) << p.name;
+  }
+  EXPECT_EQ(off, 7);
 }
 
 TEST(SecondLineOfTheFrontEnd, ABoardWithOtherThresholdsIsNotWiderAndSlower) {
@@ -142,7 +256,8 @@ TEST(SecondLineOfTheFrontEnd, ABoardWithOtherThresholdsIsNotWiderAndSlower) {
   EXPECT_FALSE(undervoltage_is_wider_and_slower(line, table9.rules, period_s));
   hal::bq76952::Board fast = table9.board;
   fast.overcurrent_delay_s = 0.2;
-  EXPECT_FALSE(overcurrent_is_wider_and_slower(second_line(hal::bq76952::settings(fast), 0.1), table9.rules, period_s));
+  EXPECT_FALSE(
+      overcurrent_is_wider_and_slower(second_line(hal::bq76952::settings(fast), 0.1), table9.rules, table9.pack));
 }
 
 /// This test is compiled for another truck than the forklift board's: bms_board_of_another_truck in

@@ -150,5 +150,34 @@ TEST_P(Stop, RequestForNothingEndsTheRequestOfTheTruck) {
   }
 }
 
+/// A truck repeats its request 0 each second, and the driver may turn the key in the moment of such a repetition: both
+/// arrive with one sample. With a stop in the same sample nothing is followed until the truck has asked for nothing.
+TEST(RequestOfOneSample, IsFollowedWithItsRepetitionUnlessAStopCame) {
+  for (const bool stop : {false, true}) {
+    TruckDay t;
+    t.talks = false;
+    t.run(1);
+    if (stop) t.send(can::Stop{}.frame(0));
+    t.send_request(0);
+    t.send_request(1);
+    t.step();
+    EXPECT_EQ(t.state(), can::ContactorState::state_off) << "the request 0 may have come last";
+    for (int k = 0; k < 100; ++k) {
+      if (k % 10 == 9) t.send_request(1);
+      t.step();
+      ASSERT_FALSE(stop && t.any_closed()) << k;
+    }
+    EXPECT_EQ(t.drives(), !stop);
+    if (!stop) continue;
+    t.send_request(0);
+    t.step();
+    for (int k = 0; k < 100; ++k) {
+      if (k % 10 == 0) t.send_request(1);
+      t.step();
+    }
+    EXPECT_TRUE(t.drives());
+  }
+}
+
 }  // namespace
 }  // namespace bms::firmware

@@ -19,7 +19,11 @@ inline constexpr hal::bq76952::Board board_under_test{.overvoltage_v = 3.8,
                                                       .overcurrent_delay_s = 0.42,
                                                       .high_overcurrent_a = 450,
                                                       .high_overcurrent_delay_s = 0.3,
-                                                      .short_circuit_a = 600};
+                                                      .short_circuit_a = 600,
+                                                      .sustained_a = 310,
+                                                      .charge_hot_c = 50,
+                                                      .discharge_hot_c = 65,
+                                                      .charge_cold_c = -5};
 
 extern Bq76952Model* chip;                    ///< at the end of the I2C bus; set by each test
 extern std::vector<can::Frame> arriving;      ///< frames that can_receive() returns

@@ -112,7 +112,7 @@ bool Bq76952Model::control_command(std::uint16_t address) {
 void Bq76952Model::exit_config() {
   config_ = was_reset_ = false;
   start_firmware();
-  // Comm Type 0x11: I2C with CRC, 0x12: the same at 400 kHz (SLUUBY2B, 13.3.2.5)
+  // Comm Type 0x11: I2C with CRC, 0x12: the same above 100 kHz (SLUUBY2B, 13.3.2.5)
   if (!needs_swap) checked_ = memory_[bq::comm_type] == 0x11 || memory_[bq::comm_type] == 0x12;
 }
 
@@ -331,6 +331,10 @@ void Bq76952Model::write_register(std::uint8_t at, std::uint8_t value) {
 
 // ---- the wire ----
 
+/// "0x11 = I2C with CRC (for use up to 100kHz bus speed)" (SLUUCG7, data memory). What the chip does above it is not
+/// known; here it does not answer.
+bool Bq76952Model::too_fast() const { return checked_ && memory_[bq::comm_type] == 0x11 && bus_hz > 100e3; }
+
 I2cResult Bq76952Model::take(std::span<const std::uint8_t> out) {
   std::vector<std::uint8_t> message{0x10, out[0]};
   std::uint8_t at = out[0];
@@ -386,7 +390,7 @@ I2cResult Bq76952Model::transfer(std::uint8_t address, std::span<const std::uint
     return I2cResult::timed_out;
   }
   if (hit && fault.kind == Fault::reset) reset();
-  if (gone || shutdown_ || address != 0x08 || (hit && fault.kind == Fault::no_acknowledge)) {
+  if (gone || shutdown_ || address != 0x08 || too_fast() || (hit && fault.kind == Fault::no_acknowledge)) {
     advance(25);
     return I2cResult::no_acknowledge;
   }

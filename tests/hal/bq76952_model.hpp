@@ -47,6 +47,7 @@ class Bq76952Model {
   bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false,
        deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
   std::uint16_t device_number = 0x7695;
+  double bus_hz = 400e3;  ///< clock of the host
   struct Fault {
     enum Kind { none, no_acknowledge, flipped_bit, timed_out, reset } kind = none;
     int at = 0, count = 0;  ///< first faulty transfer, counted from now; number of them
@@ -108,6 +109,7 @@ class Bq76952Model {
   std::uint16_t manufacturing_status() const;
   std::uint8_t fet_status() const;
   void write_register(std::uint8_t at, std::uint8_t value);
+  bool too_fast() const;
   hal::I2cResult take(std::span<const std::uint8_t> out);
   void give(std::uint8_t command, std::span<std::uint8_t> in, std::uint64_t start_us, std::size_t bytes_before);
   bool fet_on(bool turned_off, std::uint8_t off_bit, bool test) const;

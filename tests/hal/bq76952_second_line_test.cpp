@@ -59,6 +59,12 @@ INSTANTIATE_TEST_SUITE_P(
         Trip{"ChargeOvercurrent", charge_overcurrent, 420, [](auto& m) { m.current_a = 365; }, false, true},
         Trip{"DischargeOvercurrent", discharge_overcurrent, 420, [](auto& m) { m.current_a = -365; }, true, false},
         Trip{"HighDischargeOvercurrent", discharge_overcurrent, 300, [](auto& m) { m.current_a = -465; }, true, false},
+        Trip{"SustainedDischarge", discharge_overcurrent, 20'300, [](auto& m) { m.current_a = -320; }, true, false},
+        Trip{"HotForCharging", temperature, 20'300, [](auto& m) { m.temperature_c[1] = 51; }, false, true},
+        Trip{"HotForDischarging", temperature, 20'300, [](auto& m) { m.temperature_c[2] = 66; }, true, true},
+        Trip{"ColdForCharging", temperature, 20'300, [](auto& m) { m.temperature_c[3] = -6; }, false, true},
+        Trip{"ABrokenThermistorReadsAsCold", temperature, 20'300, [](auto& m) { m.temperature_c[0] = -273; }, false,
+             true},
         Trip{"ShortCircuit", short_circuit, 0, [](auto& m) { m.current_a = -605; }, true, true},
         Trip{"PermanentFailure", permanent_failure, 0,
              [](auto& m) {  // one that the driver does not enable

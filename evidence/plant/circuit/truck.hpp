@@ -83,6 +83,7 @@ class Truck {
   void set_pins(const ControllerPins& pins) { pins_ = pins; }
   void set_drive(const Drive& drive) { drive_ = drive; }
   void set_charger(const ChargerDemand& demand) { charger_ = demand; }
+  void set_idle_w(double idle_w) { parameters_.dc_link.idle_w = idle_w; }
   void add_vdda_dip(const SupplyDip& dip) { vdda_dips_.push_back(dip); }
   void add_coil_supply_dip(const SupplyDip& dip) { coil_dips_.push_back(dip); }
   Contactor& contactor(Relay relay) { return contactors_[static_cast<std::size_t>(relay)]; }

@@ -22,7 +22,7 @@ constexpr std::uint32_t cell_undervoltage = 1, cell_overvoltage = 2, charge_over
 
 TEST(SecondLine, AnyTripOpensWithItsSampleUntilItIsClearedTenSecondsAfterItsEnd) {
   for (const std::uint32_t trip :
-       {cell_undervoltage, cell_overvoltage, charge_overcurrent, discharge_overcurrent, temperature, host_silence}) {
+       {cell_undervoltage, cell_overvoltage, charge_overcurrent, discharge_overcurrent, host_silence}) {
     ProtectionBench b;
     b.drive_off();
     b.inputs.second_line = trip;
@@ -46,6 +46,16 @@ TEST(SecondLine, AnyTripOpensWithItsSampleUntilItIsClearedTenSecondsAfterItsEnd)
     b.step();
     EXPECT_EQ(b.protection.decision().faults, 0U);
   }
+}
+
+/// The front end keeps its pins low as long as the pack is too cold or too hot. That ends by itself.
+TEST(SecondLine, ATemperatureIsAStateAndNoTrip) {
+  ProtectionBench b;
+  b.drive_off();
+  b.inputs.second_line = temperature;
+  b.run(300);
+  EXPECT_TRUE(b.protection.decision().outputs.main_plus);
+  EXPECT_EQ(b.protection.decision().faults, 0U);
 }
 
 /// The comparator opens within a millisecond, so that the mean current of the sample may be a few amperes.

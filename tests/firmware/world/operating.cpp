@@ -109,11 +109,16 @@ std::string bring_to(TruckWorld& world, const Pack& pack, Operating state) {
   return "";
 }
 
-double key_off(TruckWorld& world, double within_ms) {
-  set_drive_a(world, 0);
-  set_charger_a(world, 0);
+double key_off(TruckWorld& world, double within_ms, double standby_a) {
+  constexpr double drive_stops_ms = 300;
   world.vehicle.request = Request::none;
-  return world.run_until([&] { return !world.any_main_closed(); }, within_ms);
+  const auto opened = [&] { return !world.any_main_closed(); };
+  const double ms = world.run_until(opened, drive_stops_ms);
+  set_drive_a(world, -standby_a);
+  set_charger_a(world, 0);
+  if (ms >= 0) return ms;
+  const double rest_ms = world.run_until(opened, within_ms);
+  return rest_ms < 0 ? rest_ms : drive_stops_ms + rest_ms;
 }
 
 std::string summary(const TruckWorld& world) {

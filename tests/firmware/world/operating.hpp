@@ -36,8 +36,9 @@ std::string bring_to(TruckWorld& world, const Pack& pack, Operating state);
 /// Current of the drive [A]; > 0 recuperates.
 void set_drive_a(TruckWorld& world, double current_a);
 void set_charger_a(TruckWorld& world, double current_a);
-/// Key off: no load and no request. Returns the milliseconds until both main contacts are open, or a negative value.
-double key_off(TruckWorld& world, double within_ms = 8'000);
+/// Key off: the request ends at once, the drive and the charger 0.3 s later, and a load of `standby_a` goes on. Returns
+/// the milliseconds until both main contacts are open, or a negative value.
+double key_off(TruckWorld& world, double within_ms = 8'000, double standby_a = 0);
 
 /// Published faults and closings in the wrong moment, for a message.
 std::string summary(const TruckWorld& world);

@@ -23,6 +23,7 @@ struct Extent {
   std::uint64_t seed = 1;
   std::string only;        ///< cases whose name contains one of these texts, separated by |; empty: all
   double minutes = 10;     ///< of the shift
+  std::size_t days = 30;   ///< of the month
   std::size_t cells = 16;  ///< in series, for the starts
   unsigned at_once = 2;
   bool continues = false;     ///< good outcomes of an earlier run with the same image and seed count
@@ -41,5 +42,6 @@ Result run_supply_dips(const Extent& extent);
 Result run_fault_matrix(const Extent& extent);
 Result run_overloads(const Extent& extent);
 Result run_shift(const Extent& extent);
+Result run_month(const Extent& extent);  ///< ordinary days: three shifts each, with what a driver does
 
 }  // namespace bms::world

@@ -1,10 +1,11 @@
 // Runs the flashed image of the forklift board in the circuit of a truck: ./bms world [SCENARIO] [OPTIONS]
 //
-//   SCENARIO         starts, contacts, dips, faults, overloads or shift; all of them if not given
+//   SCENARIO         starts, contacts, dips, faults, overloads, shift or month; all if not given
 //   --count N        so many worlds or cases instead of all
 //   --seed N         of the random worlds
 //   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
 //   --minutes N      duration of the shift
+//   --days N         of each truck of the month; --count is the number of trucks
 //   --cells N        in series, for the starts: another number than 16
 //   --jobs N         cases at a time
 //   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed
@@ -39,7 +40,8 @@ struct Scenario {
 };
 constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run_contact_failures},
                                   {"dips", run_supply_dips},    {"faults", run_fault_matrix},
-                                  {"overloads", run_overloads}, {"shift", run_shift}};
+                                  {"overloads", run_overloads}, {"shift", run_shift},
+                                  {"month", run_month}};
 
 struct Options {
   Extent extent;
@@ -106,6 +108,8 @@ Options read_options(const std::vector<std::string>& words) {
       options.extent.only = value();
     } else if (words[k] == "--minutes") {
       options.extent.minutes = std::stod(value());
+    } else if (words[k] == "--days") {
+      options.extent.days = std::stoul(value());
     } else if (words[k] == "--cells") {
       options.extent.cells = std::stoul(value());
     } else if (words[k] == "--jobs") {

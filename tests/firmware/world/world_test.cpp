@@ -42,6 +42,8 @@ TEST(World, ProtectionsActOnPhysicalCauses) {
 
 TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.only = "", .minutes = 3, .at_once = 2})); }
 
+TEST(World, AnOrdinaryDayNeedsNoWorkshop) { expect_good(run_month({.count = 2, .only = "", .days = 1, .at_once = 2})); }
+
 /// Between deep discharge (1.5 V) and cell undervoltage severe (1.8 V): C/20 after a clear command.
 TEST(World, ACellBelow1800mVIsChargedWithATwentiethOfTheCapacityOnly) {
   TruckWorld world(pack().image, typical_setup(pack()));
