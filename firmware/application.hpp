@@ -331,10 +331,10 @@ class Application {
   }
 
   void publish_parameter() {
-    if (!hal::can_listening()) return;
     const auto number = parameter_commands_.next_part();
     if (!number) [[likely]]
       return;
+    if (!hal::can_listening()) return;
     telemetry_.send_parameter(*number, values_to_send(Board::parameters(), *number));
   }
 

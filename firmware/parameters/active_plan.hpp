@@ -42,7 +42,7 @@ class ActivePlan {
   protection::ProtectionPlan& disturb() { return plan_; }
 
  private:
-  static constexpr std::size_t part_bytes = 16;  ///< a pass takes some 90 samples
+  static constexpr std::size_t part_bytes = 8;  ///< a pass takes some 180 samples
 
   std::span<const std::uint8_t> bytes() const { return {reinterpret_cast<const std::uint8_t*>(&plan_), sizeof(plan_)}; }
 
