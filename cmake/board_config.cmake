@@ -1,6 +1,7 @@
 # bms_board_config(NAME FOLDER SOURCE TEXT [CELLS N] [SAMPLE_PERIOD_S S] [CURRENT_RANGE_A A] [FIXED_POINT true|false]
 #                  [DC_LINK true|false] [TRUCK_STATED true|false] [PRECHARGE_S S] [CLOSING_A A] [CLOSING_OHM OHM]
-#                  [VEHICLE_PROFILE none|cia418|j1939] [CANOPEN_NODE N] [CANOPEN_CHARGER N])
+#                  [VEHICLE_PROFILE none|cia418|j1939|elcon] [CANOPEN_NODE N] [CANOPEN_CHARGER N]
+#                  [CAN_BIT_RATE R] [CAN_BASE ID] [CAN_STOP ID] [PARAMETERS true|false])
 #
 # Writes FOLDER/board_config.hpp: all that the C++ code knows about a board and about the build options. NAME becomes
 # an interface library with FOLDER in its include path. The values below are those of the host.
@@ -17,8 +18,13 @@ function(bms_board_config name folder)
   set(bms_config_VEHICLE_PROFILE none)
   set(bms_config_CANOPEN_NODE 1)
   set(bms_config_CANOPEN_CHARGER 10)
+  set(bms_config_CAN_BIT_RATE 250000)
+  set(bms_config_CAN_BASE 0x180)
+  set(bms_config_CAN_STOP 0x0A0)
+  set(bms_config_PARAMETERS true)
   set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK TRUCK_STATED PRECHARGE_S
-    CLOSING_A CLOSING_OHM VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER)
+    CLOSING_A CLOSING_OHM VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER CAN_BIT_RATE CAN_BASE CAN_STOP
+    PARAMETERS)
   cmake_parse_arguments(arg "" "SOURCE;${settings}" "" ${ARGN})
   set(bms_config_source ${arg_SOURCE})
   foreach(setting ${settings})

@@ -16,14 +16,17 @@
 # bms_<board>*.cdx.json (sbom.py).
 #
 # board.cmake chooses the CAN back end and the source of the samples:
-#   BMS_CAN        slcan, or bxcan with a bit rate
+#   BMS_CAN        slcan, or bxcan
+#   BMS_CAN_BIT_RATE, BMS_CAN_BASE, BMS_CAN_STOP  of bxcan: bit rate, identifiers of the first message and of Stop; also
+#                  as -DBMS_CAN_BIT_RATE=R
+#   BMS_PARAMETERS  true: parameters that a workshop sets over CAN (firmware/parameters/)
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
 #   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
 #   BMS_PRECHARGE_S, BMS_CLOSING_A, BMS_CLOSING_OHM  of the truck, see boards/README.md; also as -DBMS_PRECHARGE_S=S
 #   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (firmware/can/messages.md): cia418 for a CANopen charger,
-# with the nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; or j1939.
+# with the nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; elcon for a charger of 0x1806E5F4; or j1939.
 #
 # BMS_PRODUCTION=ON builds images for a product: without a device key, or with the one for development, no contactor
 # closes and no service session opens (docs/safety/commands.md).
@@ -36,7 +39,7 @@
 # IMAGE_shared compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
-set(of_pack_and_truck CELLS PRECHARGE_S CLOSING_A CLOSING_OHM)
+set(of_pack_and_truck CELLS PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
 foreach(value ${of_pack_and_truck})
   set(wanted_${value} ${BMS_${value}})
 endforeach()
@@ -59,11 +62,12 @@ if(NOT BMS_CELL)
   set(BMS_CELL ${BMS_DEFAULT_CELL})
 endif()
 
-set(BMS_VEHICLE_PROFILE none CACHE STRING "additional messages: none, cia418 or j1939 (firmware/can/messages.md)")
+set(BMS_VEHICLE_PROFILE none CACHE STRING
+  "additional messages: none, cia418, j1939 or elcon (firmware/can/messages.md)")
 set(BMS_CANOPEN_NODE 1 CACHE STRING "CANopen node of the battery")
 set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
-if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939)$")
-  message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418 or j1939")
+if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939|elcon)$")
+  message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418, j1939 or elcon")
 endif()
 option(BMS_PRODUCTION "an image for a product: nothing works without a device key of its own" OFF)
 if(NOT BMS_CURRENT_RANGE_A)
@@ -76,6 +80,9 @@ endif()
 if(NOT DEFINED BMS_DC_LINK)
   set(BMS_DC_LINK true)
 endif()
+if(NOT DEFINED BMS_PARAMETERS)
+  set(BMS_PARAMETERS false)
+endif()
 set(truck_stated false)
 if(DEFINED BMS_PRECHARGE_S OR DEFINED BMS_CLOSING_A OR DEFINED BMS_CLOSING_OHM)
   set(truck_stated true)
@@ -83,7 +90,8 @@ endif()
 bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.cmake
   ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
-  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER})
+  VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
+  PARAMETERS ${BMS_PARAMETERS})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
@@ -229,13 +237,17 @@ bms_shared_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${
   ${no_hardware})
 bms_shared_objects(storage -Os ${root}/firmware/storage/log.cpp ${root}/firmware/storage/persistence.cpp)
 if(NOT BMS_SHARED_OBJECTS)
-  target_compile_definitions(hal_board PRIVATE ${BMS_CAN_DEFINITION})
   target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
 endif()
 
 # The cell file decides which model these compile.
 set(generated_headers ${cell_header} ${can_messages} ${j1939_messages})
-bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${generated_headers})
+set(parameters "")
+if(BMS_PARAMETERS)
+  set(parameters ${root}/firmware/board_parameters.cpp)
+endif()
+bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${parameters}
+  ${generated_headers})
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
   OUTPUT_FORMAT HEXADECIMAL)

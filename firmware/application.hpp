@@ -11,13 +11,16 @@
 
 #include <algorithm>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/access.hpp"
+#include "firmware/board_parameters.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
+#include "firmware/parameter_commands.hpp"
 #include "firmware/power_requests.hpp"
 #include "firmware/progress.hpp"
 #include "firmware/snapshot.hpp"
@@ -52,6 +55,7 @@ class Application {
   using Estimator = typename Board::Estimator;
   using Result = typename Estimator::Result;
   static constexpr std::size_t cells = Board::cells;
+  static constexpr bool has_parameters = requires { Board::parameters(); };
 
   /// start: state of charge from outside or from storage. persistence: already started.
   Application(const std::optional<measurement::StartingPoint>& start, const messages::Identity& identity,
@@ -75,6 +79,7 @@ class Application {
     const std::uint64_t began_us = hal::now_us();
     board_.state = hal::board_state();
     const measurement::Sample mean = estimator::mean_cell(pack, Board::plausible());
+    if constexpr (has_parameters) board_.parameters_lost = Board::parameters().lost();
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
     const auto request = requested_.power.active(vehicle_profile_.charger(pack.time_us), pack.time_us);
@@ -109,6 +114,8 @@ class Application {
     persistence_.supply_failing(now.values(), hal::calendar_s());
   }
 
+  const VehicleProfile& vehicle_profile() const { return vehicle_profile_; }
+
  private:
   using StateToStore = StateToStoreOf<typename Estimator::Scalar, cells>;
   static constexpr int max_requests = 4;  // per sample: bounds its processing time
@@ -128,6 +135,7 @@ class Application {
                                          .stored_part = requested_.next_stored_part(),
                                          .request_challenge = access_.drive.message()};
     telemetry_.publish(now);
+    if constexpr (has_parameters) publish_parameter();
     vehicle_profile_.publish(now);
   }
 
@@ -165,14 +173,16 @@ class Application {
     inputs.link_plus_uv = link.plus_uv;
     inputs.link_minus_uv = link.minus_uv;
     const hal::AuxiliaryContacts contacts = hal::auxiliary_contacts();
-    inputs.auxiliary = {contacts.fitted, contacts.main_plus_closed, contacts.main_minus_closed};
-    inputs.contact_lost = contacts.losses != 0;
+    if (fitted(parameters::auxiliary_contacts_fitted)) {
+      inputs.auxiliary = {contacts.fitted, contacts.main_plus_closed, contacts.main_minus_closed};
+      inputs.contact_lost = contacts.losses != 0;
+    }
     inputs.second_line = hal::second_line_trips();
-    inputs.second_current_ua = hal::second_current_ua();
+    if (fitted(parameters::second_current_fitted)) inputs.second_current_ua = hal::second_current_ua();
     const std::uint32_t supply_falls = hal::supply_falls();
     inputs.supply_dip = board_.state.supply_low || supply_falls != 0;
     inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() ||
-                         latched_faults_.endangered() ||
+                         parameters_unfit(inputs.clear) || latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
     inputs.storage_fault = persistence_.log().sectors() > 0 &&
                            (setting_lost_ || !persistence_.log().operational() || persistence_.full_for_long());
@@ -278,14 +288,19 @@ class Application {
       if (access_.session.state() != before) record_session(access_.session.state());
       return serviced;
     };
-    auto answer = commands_.handle(frame, now_us, requested_, may);
+    const auto other = [&](const can::Command& command, auto&& allowed) {
+      if constexpr (has_parameters) return handle_parameters(command, allowed);
+      return can::CommandAnswer::result_no_such_command;
+    };
+    auto answer = commands_.handle(frame, now_us, requested_, may, other);
     if (!answer) return false;
     if (const std::uint32_t time = std::exchange(requested_.unix_time_s, 0); time != 0 && !hal::calendar_set(time))
       answer->result = can::CommandAnswer::result_refused;
     if (const auto change = std::exchange(requested_.calibration_change, std::nullopt);
         change && !apply_calibration(*change))
       answer->result = can::CommandAnswer::result_refused;
-    if (serviced && answer->result == can::CommandAnswer::result_done)
+    if (serviced && answer->result == can::CommandAnswer::result_done &&
+        answer->code != can::Command::code_set_parameter)  // only the set that is applied is recorded
       record_action(answer->code, can::Command::of(frame).argument);
     telemetry_.answer(*answer);
     return true;
@@ -295,9 +310,47 @@ class Application {
   /// is closed, the readings that protect must not change.
   [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
     if (protection_.decision().outputs.any_closed() || !persistence_.may_set()) return false;
-    if (!hal::calibrate(stored_calibration(persistence_, change))) return false;
+    hal::SensorCalibration calibration = stored_calibration(persistence_, change);
+    if constexpr (has_parameters) calibration = with_shunt(calibration, Board::parameters());
+    if (!hal::calibrate(calibration)) return false;
     store_setting(static_cast<std::uint16_t>(first_calibration_key + change.which),
                   static_cast<std::uint32_t>(change.value));
+    return true;
+  }
+
+  template <class May>
+  [[gnu::noinline]] std::uint32_t handle_parameters(const can::Command& command, May&& may) {
+    auto& block = Board::parameters();
+    const std::uint16_t before = block.revision();
+    const std::uint32_t result =
+        parameter_commands_.execute(command, protection_.decision().outputs.any_closed(), block, persistence_, may);
+    if (block.revision() == before) return result;
+    Board::apply_parameters();
+    hal::calibrate(with_shunt(stored_calibration(persistence_), block));
+    return result;
+  }
+
+  void publish_parameter() {
+    const auto number = parameter_commands_.next_part();
+    if (!number) [[likely]]
+      return;
+    if (!hal::can_listening()) return;
+    telemetry_.send_parameter(*number, values_to_send(Board::parameters(), *number));
+  }
+
+  /// The stored parameters are lost, or the plan that follows from them has changed by itself.
+  bool parameters_unfit(protection::Clear clear) {
+    if constexpr (has_parameters) {
+      if (clear == protection::Clear::service) Board::parameters().accept(persistence_);
+      return Board::parameters().lost() || !Board::plan_intact();
+    }
+    return false;
+  }
+
+  /// Returns false for an input that this truck does not have, as its parameters say.
+  static bool fitted(std::int32_t input) {
+    if constexpr (has_parameters)
+      return (at(Board::parameters().active(), parameters::Parameter::inputs_fitted) & input) != 0;
     return true;
   }
 
@@ -317,6 +370,8 @@ class Application {
   [[no_unique_address]] VehicleProfile vehicle_profile_;
   float capacity_ah_ = 0;
   Commands commands_;
+  struct NoParameters {};
+  [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;
   Requested requested_;
   Result estimate_{};
   Progress progress_;

@@ -25,7 +25,7 @@ const protection::ProtectionPlan& BoardCell::plan() {
                 "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
   static constexpr auto plan = protection::protection_plan(board_pack);
   static_assert(protection::consistent(plan.rules), "limits of the cell contradict each other");
-  return plan;
+  return active_plan_or<BoardCell>(plan);
 }
 
 }  // namespace bms::firmware

@@ -10,7 +10,9 @@
 #include "estimator/pack_estimator.hpp"
 #include "estimator/soc_estimator.hpp"
 #include "firmware/application.hpp"
+#include "firmware/board_parameters.hpp"
 #include "firmware/cia418_profile.hpp"
+#include "firmware/elcon_profile.hpp"
 #include "firmware/j1939_profile.hpp"
 #include "firmware/messages.hpp"
 #include "hal/samples.hpp"
@@ -40,10 +42,14 @@ template <>
 struct ProfileOf<hal::VehicleProfile::j1939> {
   using Type = J1939Profile;
 };
+template <>
+struct ProfileOf<hal::VehicleProfile::elcon> {
+  using Type = ElconProfile;
+};
 using BoardVehicleProfile = ProfileOf<hal::vehicle_profile>::Type;
 
 /// The application's Board (firmware/application.hpp).
-struct BoardCell {
+struct BoardCell : ParametersOfBoard<hal::has_parameters> {
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
 

@@ -31,6 +31,7 @@
 #include <tuple>
 
 #include "firmware/canopen.hpp"
+#include "firmware/charge_control.hpp"
 #include "firmware/cycle.hpp"
 #include "firmware/messages.hpp"
 #include "firmware/power_requests.hpp"
@@ -54,6 +55,7 @@ class Cia418Profile {
   /// Updates the objects, then sends what is due.
   template <class Estimator, std::size_t Cells>
   void publish(const Snapshot<Estimator, Cells>& now) {
+    control_.update(now, {.present = charger_.present(now.pack.time_us)});
     update_objects(now);
     if (!hal::can_listening()) return;
     const auto now_us = static_cast<std::uint32_t>(now.pack.time_us);
@@ -66,10 +68,11 @@ class Cia418Profile {
     node_.receive(frame, *this);
   }
 
-  /// An operational charger asks for a charge until its heartbeat ends or has another state.
+  /// An operational charger asks for a charge until its heartbeat ends or has another state, or the battery is full.
   constexpr ChargerState charger(std::uint64_t now_us) const {
-    return {charger_.present(now_us), charger_.operational(now_us)};
+    return {charger_.present(now_us), charger_.operational(now_us) && control_.wanted()};
   }
+  constexpr const ChargeControl& control() const { return control_; }
 
   /// Object dictionary, for the SDO server.
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
@@ -98,7 +101,7 @@ class Cia418Profile {
   template <class Estimator, std::size_t Cells>
   void update_objects(const Snapshot<Estimator, Cells>& now) {
     const std::int32_t allowed_ua = now.decision.allowed.charge_ua;
-    const bool charge_me = now.decision.outputs.charge_enable && allowed_ua > 0;
+    const bool charge_me = now.decision.outputs.charge_enable && allowed_ua > 0 && control_.wanted();
     const std::int16_t cdegc = now.pack.temperature_cdegc[0];
     temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
     status_ = charge_me ? 1 : 0;
@@ -165,6 +168,7 @@ class Cia418Profile {
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
   canopen::Peer charger_{static_cast<std::uint8_t>(hal::canopen_charger)};
+  ChargeControl control_;
   Cycle cycle_;
   std::uint32_t voltage_ = 0xFFFF'FFFF;
   std::int16_t temperature_ = no_value;

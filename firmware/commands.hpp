@@ -37,7 +37,7 @@ inline constexpr std::uint32_t stored_parts = 16 + 7 + 16;
 /// What a command may need beyond a right CRC.
 enum class Privilege : std::uint8_t {
   drive,    ///< to close contactors
-  service,  ///< to clear faults, calibrate or set the time
+  service,  ///< to clear faults, calibrate, set the time or parameters
 };
 
 /// What the commands have requested so far.
@@ -60,13 +60,21 @@ struct Requested {
   }
 };
 
+struct NoOtherCommands {
+  template <class May>
+  constexpr std::uint32_t operator()(const can::Command&, May&&) const {
+    return can::CommandAnswer::result_no_such_command;
+  }
+};
+
 class Commands {
  public:
   /// Executes a command and returns the answer, or nothing if the frame is ignored. now_us: time of the sample.
   /// may(Privilege): whether this frame has that privilege; asked at most once.
-  template <class May>
+  /// other(command, may): the result of a command that is not known here.
+  template <class May, class Other = NoOtherCommands>
   constexpr std::optional<can::CommandAnswer> handle(const can::Frame& frame, std::uint64_t now_us,
-                                                     Requested& requested, May&& may) {
+                                                     Requested& requested, May&& may, Other&& other = {}) {
     if (frame.id != can::Command::id || frame.long_id || !can::intact(frame, can::Command::data_id))
       return std::nullopt;
     const std::uint8_t counter = can::counter_of(frame);
@@ -79,14 +87,14 @@ class Commands {
     can::CommandAnswer answer;
     answer.code = command.code;
     answer.command_counter = counter;
-    answer.result = execute(command, now_us, requested, may);
+    answer.result = execute(command, now_us, requested, may, other);
     return answer;
   }
 
  private:
-  template <class May>
+  template <class May, class Other>
   static constexpr std::uint32_t execute(const can::Command& command, std::uint64_t now_us, Requested& requested,
-                                         May&& may) {
+                                         May&& may, Other&& other) {
     using A = can::CommandAnswer;
     switch (command.code) {
       case can::Command::code_clear_faults:
@@ -131,7 +139,7 @@ class Commands {
         return A::result_done;
       }
       default:
-        return A::result_no_such_command;
+        return other(command, may);
     }
   }
 

@@ -11,7 +11,32 @@ namespace {
 
 constexpr std::uint32_t watchdog_ms = 2'000;
 
-using BoardApplication = bms::firmware::Application<bms::firmware::BoardCell, bms::firmware::BoardVehicleProfile>;
+using bms::firmware::BoardCell;
+
+template <class Board>
+bms::hal::SensorCalibration start_parameters(bms::storage::Persistence& persistence) {
+  const bms::hal::SensorCalibration stored = bms::firmware::stored_calibration(persistence);
+  if constexpr (requires { Board::parameters(); }) {
+    Board::parameters().start(persistence);
+    Board::apply_parameters();
+    return bms::firmware::with_shunt(stored, Board::parameters());
+  }
+  return stored;
+}
+
+template <class Board>
+bms::hal::CanSettings can_settings() {
+  if constexpr (requires { Board::parameters(); }) {
+    using bms::parameters::Parameter;
+    const auto& active = Board::parameters().active();
+    const auto id = [&](Parameter p) { return static_cast<std::uint16_t>(at(active, p)); };
+    return {1'000 * static_cast<std::uint32_t>(at(active, Parameter::can_bit_rate)), id(Parameter::can_base),
+            id(Parameter::can_stop)};
+  }
+  return bms::hal::can_settings_of_build;
+}
+
+using BoardApplication = bms::firmware::Application<BoardCell, bms::firmware::BoardVehicleProfile>;
 BoardApplication* running = nullptr;
 
 }  // namespace
@@ -29,8 +54,8 @@ int main() {
   storage::Persistence persistence;
   // may erase, up to half a second per sector; so it comes before anything that must answer in time
   persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s(), hal::retained_ram());
-  hal::calibrate(stored_calibration(persistence));
-  hal::can_start();
+  hal::calibrate(start_parameters<BoardCell>(persistence));
+  hal::can_start(can_settings<BoardCell>());
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
   const auto given_start = hal::starting_point();

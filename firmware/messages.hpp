@@ -114,6 +114,16 @@ constexpr can::PackElectrical pack_electrical(const measurement::PackSample<Cell
   return m;
 }
 
+inline constexpr std::int32_t most_ua_of_pack_electrical = 655'340'000;
+
+template <std::size_t Cells>
+constexpr can::PackCurrent pack_current(const measurement::PackSample<Cells>& pack) {
+  can::PackCurrent m;
+  m.current =
+      pack.current_ua == measurement::no_reading ? can::PackCurrent::current_layout.invalid : pack.current_ua / 1'000;
+  return m;
+}
+
 template <std::size_t Cells>
 constexpr can::PackVoltage pack_voltage(const measurement::PackSample<Cells>& pack) {
   can::PackVoltage m;

@@ -19,6 +19,7 @@ namespace bms::firmware {
 struct BoardStatus {
   hal::BoardState state;
   bool cell_file_changed = false;       ///< the stored data belong to another cell file
+  bool parameters_lost = false;         ///< the stored parameters cannot be read (firmware/parameters/)
   std::uint32_t longest_sample_us = 0;  ///< longest processing time of a sample so far; 0: not known yet
 
   constexpr bool unfit() const { return state.unfit() || cell_file_changed; }

@@ -11,6 +11,7 @@
 #include <tuple>
 #include <type_traits>
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake
 #include "estimator/pack_estimator.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/cycle.hpp"
@@ -51,7 +52,9 @@ class Telemetry {
     if (now.request_challenge) send_if_due<can::RequestChallenge>([&] { return *now.request_challenge; });
     send_if_due<can::Storage>([&] { return messages::storage(now.persistence); });
     send_if_due_or_changed<can::Board>(now.board.alarming() != published_alarming_, [&] {
-      return messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
+      auto m = messages::board(now.board.state, now.board.cell_file_changed, now.board.longest_sample_us);
+      if constexpr (hal::has_parameters) m.parameters_lost = now.board.parameters_lost ? 1 : 0;
+      return m;
     });
     published_alarming_ = now.board.alarming();
     if (now.stored_part) [[unlikely]]
@@ -72,6 +75,16 @@ class Telemetry {
   std::uint32_t published() const { return published_; }
 
   void answer(const can::CommandAnswer& answer) { send(answer); }
+  /// The frames of a parameter, in the order of ParameterValue.Kind.
+  void send_parameter(std::uint8_t number, const std::array<std::int32_t, 4>& values) {
+    can::ParameterValue m;
+    m.number = number;
+    for (const std::int32_t value : values) {
+      m.value = value;
+      send(m);
+      ++m.kind;
+    }
+  }
   void answer(const can::ServiceChallenge& answer) { send(answer); }
 
  private:
@@ -150,6 +163,8 @@ class Telemetry {
     if constexpr (Cells > messages::max_cells_of_pack_electrical)
       send_if_due<can::PackVoltage>([&] { return messages::pack_voltage(now.pack); });
     send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(now.pack, now.cells); });
+    if (now.plan.rule(protection::Fault::short_circuit).threshold > messages::most_ua_of_pack_electrical)
+      send_if_due<can::PackCurrent>([&] { return messages::pack_current(now.pack); });
     send_if_due<can::Temperatures>([&] { return messages::temperatures(now.pack); });
     send_if_due<can::Balancing>([&] { return messages::balancing(now.decision); });
   }

@@ -43,6 +43,20 @@ inline constexpr auto request_and_sample_ids = [] {
   return ids;
 }();
 
+/// 29-bit identifiers of chargers that the battery receives: those with the bits of `id` where `mask` has ones.
+struct LongId {
+  std::uint32_t id, mask;
+  constexpr bool matches(std::uint32_t other) const { return ((id ^ other) & mask) == 0; }
+};
+inline constexpr auto long_ids = [] {
+  if constexpr (vehicle_profile == VehicleProfile::elcon)
+    return std::array<LongId, 1>{{{0x18FF'50E5, 0x1FFF'FFFF}}};
+  else if constexpr (vehicle_profile == VehicleProfile::j1939)  // address claimed; request for a parameter group
+    return std::array<LongId, 2>{{{0x00EE'0000, 0x00FF'0000}, {0x00EA'0000, 0x00FF'0000}}};
+  else
+    return std::array<LongId, 0>{};
+}();
+
 /// The identifiers that this image receives: one of the lists above, by the source of its samples. Back ends: absent/
 /// starting_point, remote/samples.
 std::span<const std::uint16_t> accepted_ids();

@@ -1,4 +1,4 @@
-// A classic CAN bus: sends standard and 29-bit frames, receives standard frames. Sending may wait for the line,
+// A classic CAN bus: sends and receives standard frames and 29-bit frames. Sending may wait for the line,
 // receiving never does. Back ends: stm32f4/bxcan (a real bus), slcan/ (text over a UART), absent/ (no bus).
 //
 // can_receive() and can_listening() also handle start, errors and bus-off. Call one of them about every 10 ms.
@@ -6,12 +6,17 @@
 
 #include <cstdint>
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake: bit rate and identifiers
 #include "can/frame.hpp"
+#include "hal/identifiers.hpp"
 
 namespace bms::hal {
 
-/// Returns at once. can_health() shows when the node is on the bus.
-void can_start();
+inline constexpr CanSettings can_settings_of_build{can_bit_rate, can_base, can_stop};
+
+/// Returns at once. can_health() shows when the node is on the bus. Other back ends than a real bus ignore the
+/// settings.
+void can_start(const CanSettings& settings = can_settings_of_build);
 
 /// Returns true if another node would receive a frame: the bus is up and acknowledges, or the SLCAN channel is open.
 bool can_listening();

@@ -6,7 +6,7 @@
 //   drive requests  48, the newest first: the newest valid one counts, so a flood can only push out older ones
 //   request         one: the newest plain request for power (Command)
 //   commands        eight, the oldest first: other commands and the frames of service sessions
-//   network         eight, the oldest first: CANopen
+//   network         eight, the oldest first: CANopen, chargers with 29-bit identifiers
 //
 // A frame of the battery's own messages that is too short, has a wrong CRC or an impossible counter is never queued. A
 // frame that finds its place full is dropped; of drive requests, the oldest one.
@@ -61,7 +61,12 @@ class RequestQueue {
   static constexpr std::size_t drive_requests = 48;
 
   constexpr void push(const can::Frame& frame) {
-    if (frame.long_id) return;
+    if (frame.long_id) {
+      for (const LongId& accepted : long_ids) {
+        if (accepted.matches(frame.id) && !network_.full()) return network_.push(frame);
+      }
+      return;
+    }
     if (!is_own(frame.id)) {
       if (!network_.full()) network_.push(frame);
       return;

@@ -12,7 +12,7 @@ set(BMS_CURRENT_RANGE_A 41)  # 1.65 V / (20 x 2 mohm): hal/adc/cell_readings.hpp
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
-set(BMS_CAN_DEFINITION BMS_CAN_BIT_RATE=250000)
+set(BMS_CAN_BIT_RATE 250000)
 set(BMS_SAMPLES adc)
 set(BMS_DC_LINK false)
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a

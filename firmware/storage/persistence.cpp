@@ -22,7 +22,8 @@ constexpr std::uint8_t most_faults_at_once = 16, most_settings_at_once = 8, most
 constexpr std::uint64_t uaus_per_uah = 3'600'000'000;
 
 constexpr std::array known_kinds{ChargeRecord::kind,   CellsRecord::kind,    HealthRecord::kind,   EventsRecord::kind,
-                                 SettingsRecord::kind, SettingsRecord::copy, ExtremesRecord::kind, ActionsRecord::kind};
+                                 SettingsRecord::kind, SettingsRecord::copy, ExtremesRecord::kind, ActionsRecord::kind,
+                                 parameters_kind,      parameters_copy_kind};
 
 template <class R>
 bool get(Log& log, R& record, Kind kind = R::kind) {

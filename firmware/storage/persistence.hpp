@@ -82,6 +82,14 @@ class Persistence {
   bool may_set() const { return settings_at_once_ > 0; }  ///< not too many settings so far
   /// Records what a service session has done; its time_s is set here.
   void action(ActionsRecord::Action action, std::optional<std::uint32_t> calendar_s);
+  /// A record whose content the caller defines (storage/records.hpp: parameters_kind). Returns false if it is not
+  /// stored.
+  bool store_block(Kind kind, Bytes payload) { return put(kind, payload, Urgency::usual); }
+  /// The newest record of a kind, part of `into`.
+  std::optional<Bytes> load_block(Kind kind, std::span<std::uint8_t, max_payload_bytes> into) {
+    const auto found = log_.load(kind.type, kind.layout, into);
+    return found && found->layout == kind.layout ? std::optional(found->payload) : std::nullopt;
+  }
   bool settings_stored() const { return !settings_changed_; }  ///< no write of a setting has failed
   /// Call before the battery is switched off: writes charge first, 0.2 ms; everything takes 3 ms, at most 16 ms.
   void power_failing(const EstimatorSnapshot& now, std::optional<std::uint32_t> calendar_s);

@@ -12,6 +12,7 @@
 //   extremes  1       12     lowest and highest readings so far
 //   actions   1       180    what service sessions have done (actions_record.hpp)
 //   copy      1       3+6n   the settings once more: they contain what protects, and are written rarely
+//   parameters, copy  1  3+4n  what a workshop has set (firmware/parameters/)
 #pragma once
 
 #include <algorithm>
@@ -25,6 +26,8 @@
 #include "storage/log.hpp"
 
 namespace bms::storage {
+
+inline constexpr Kind parameters_kind{9, 1}, parameters_copy_kind{10, 1};
 
 using Payload = std::span<std::uint8_t, max_payload_bytes>;
 using Bytes = std::span<const std::uint8_t>;

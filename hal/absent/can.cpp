@@ -3,7 +3,7 @@
 
 namespace bms::hal {
 
-void can_start() {}
+void can_start(const CanSettings&) {}
 bool can_listening() { return false; }
 bool can_send(const can::Frame&) { return false; }
 bool can_receive(can::Frame&) { return false; }

@@ -1,6 +1,6 @@
 // Acceptance filters of ST's bxCAN for a list of identifiers: 16-bit list mode, four identifiers per bank (RM0090,
-// 32.7.4, figure 342). They accept standard data frames with exactly these identifiers; the controller discards 29-bit
-// frames, remote requests and all others.
+// 32.7.4, figure 342). They accept standard data frames with exactly these identifiers. 29-bit frames have banks in
+// mask mode; the controller discards remote requests and all others.
 #pragma once
 
 #include <algorithm>
@@ -37,6 +37,13 @@ constexpr FilterBank filter_bank(std::span<const std::uint16_t> ids, std::size_t
     return filter_of(ids[std::min(first, last)]) | filter_of(ids[std::min(first + 1, last)]) << 16;
   };
   return {pair_from(ids_per_bank * k), pair_from(ids_per_bank * k + 2)};
+}
+
+/// A bank for 29-bit data frames whose identifier has the bits of `id` where `mask` has ones: 32 bits, mask mode
+/// (figure 342). Bit 2 is IDE, bit 1 RTR.
+constexpr FilterBank long_filter_bank(std::uint32_t id, std::uint32_t mask) {
+  constexpr std::uint32_t ide = 4, rtr = 2;
+  return {id << 3 | ide, mask << 3 | ide | rtr};
 }
 
 }  // namespace bms::hal::bxcan

@@ -60,7 +60,7 @@ bool refill() {
 
 }  // namespace
 
-void can_start() {
+void can_start(const CanSettings&) {
   static std::array<char, 512> text;
   std::array<const char*, 3> words{};
   if (semihosting::arguments(text, words) != words.size()) finish(bad_pipe);

@@ -43,7 +43,7 @@ std::string_view answer_to(std::string_view line) {
 
 }  // namespace
 
-void can_start() {
+void can_start(const CanSettings&) {
   uart_start(baud);
   answer("\r");  // "ready": an emulated UART drops what comes earlier
 }

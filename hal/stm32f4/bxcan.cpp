@@ -4,7 +4,8 @@
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
 // queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
 // mailbox number instead of age.
-// Reception: filters for accepted_ids() (standard frames), the controller's FIFO of three, an interrupt, a ring of 64.
+// Reception: filters for accepted_ids() (standard frames) and long_ids (29 bits), the controller's FIFO of three, an
+// interrupt, a ring of 64.
 //
 // Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
 // after which it is tried again later; no function waits in a loop for the bus.
@@ -20,6 +21,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <span>
 
 #include "hal/accepted_frames.hpp"
 #include "hal/bxcan/bit_timing.hpp"
@@ -36,12 +38,23 @@ namespace {
 
 using namespace stm32f4;
 
-constexpr bxcan::BitTiming timing = bxcan::bit_timing(crystal_apb1_hz, BMS_CAN_BIT_RATE);
 static_assert(bxcan::fits(request_ids) && bxcan::fits(request_and_sample_ids));
 
-constexpr std::uint32_t recovery_us = bxcan::longest_recovery_us(BMS_CAN_BIT_RATE), margin_us = recovery_us / 5;
-constexpr std::uint64_t phase_timeout_us = std::max<std::uint64_t>(100'000, recovery_us + margin_us),
-                        no_progress_us = 100'000, pause_us = 1'000'000;
+struct Rate {
+  std::uint32_t bit_rate, btr, phase_timeout_us;
+};
+/// At 500 and 1,000 kbit/s the sample point is 85.7 %, the nearest one to 87.5 % that the clock allows.
+consteval Rate rate(std::uint32_t bit_rate) {
+  const std::uint32_t recovery_us = bxcan::longest_recovery_us(bit_rate), margin_us = recovery_us / 5;
+  return {bit_rate, bxcan::bit_timing(crystal_apb1_hz, bit_rate, bxcan::cia301_allows).btr(),
+          std::max<std::uint32_t>(100'000, recovery_us + margin_us)};
+}
+/// That of the build first: it is used if the settings have another one that is not here.
+constexpr std::array rates{rate(can_bit_rate), rate(125'000), rate(250'000), rate(500'000), rate(1'000'000)};
+const Rate* timing = &rates[0];
+Identifiers identifiers{can_settings_of_build};
+
+constexpr std::uint64_t no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
 
 constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
@@ -174,21 +187,26 @@ void enter(Phase next) {
 
 void configure() {
   can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
-  can1_btr() = timing.btr();
+  can1_btr() = timing->btr;
   can1_fmr() = can1_fmr() | 1U;
-  const auto ids = accepted_ids();
+  const auto accepted = accepted_ids();
+  std::array<std::uint16_t, bxcan::max_ids> on_the_bus;
+  for (std::size_t k = 0; k < accepted.size(); ++k) on_the_bus[k] = identifiers.on_the_bus(accepted[k]);
+  const auto ids = std::span<const std::uint16_t>(on_the_bus).first(accepted.size());
   const std::size_t banks = bxcan::bank_count(ids);
-  const std::uint32_t all = (1U << banks) - 1;
+  const std::uint32_t lists = (1U << banks) - 1, masks = ((1U << long_ids.size()) - 1) << banks;
   can1_fa1r() = 0;
-  can1_fs1r() = 0;    // 16 bits
-  can1_fm1r() = all;  // lists
-  can1_ffa1r() = 0;   // FIFO 0
-  for (std::uint32_t k = 0; k < banks; ++k) {
-    const bxcan::FilterBank bank = bxcan::filter_bank(ids, k);
-    can1_filter_bank(k).fr1 = bank.fr1;
-    can1_filter_bank(k).fr2 = bank.fr2;
-  }
-  can1_fa1r() = all;
+  can1_fs1r() = masks;  // 32 bits; the others 16
+  can1_fm1r() = lists;
+  can1_ffa1r() = 0;  // FIFO 0
+  const auto set = [](std::size_t k, const bxcan::FilterBank& bank) {
+    can1_filter_bank(static_cast<std::uint32_t>(k)).fr1 = bank.fr1;
+    can1_filter_bank(static_cast<std::uint32_t>(k)).fr2 = bank.fr2;
+  };
+  for (std::size_t k = 0; k < banks; ++k) set(k, bxcan::filter_bank(ids, k));
+  for (std::size_t k = 0; k < long_ids.size(); ++k)
+    set(banks + k, bxcan::long_filter_bank(long_ids[k].id, long_ids[k].mask));
+  can1_fa1r() = lists | masks;
   can1_fmr() = can1_fmr() & ~1U;
   can1_ier() = ier_tme | ier_fmp0 | ier_fov0;
 }
@@ -241,7 +259,7 @@ void service() {
       return ask_for_initialisation();
     case Phase::entering:
       if (!initialising) {
-        if (elapsed >= phase_timeout_us) abandon_phase();
+        if (elapsed >= timing->phase_timeout_us) abandon_phase();
         return;
       }
       configure();
@@ -253,7 +271,7 @@ void service() {
         progress_us = now_us();
         return enter(Phase::on);
       }
-      if (elapsed >= phase_timeout_us) abandon_phase();
+      if (elapsed >= timing->phase_timeout_us) abandon_phase();
       return;
     case Phase::on:
       if (!bus_off) return watch_transmission();
@@ -267,7 +285,11 @@ bool on_the_bus() { return phase == Phase::on && (can1_esr() & esr_bus_off) == 0
 
 }  // namespace
 
-void can_start() {
+void can_start(const CanSettings& settings) {
+  identifiers = Identifiers(settings);
+  for (const Rate& r : rates) {
+    if (r.bit_rate == settings.bit_rate) timing = &r;
+  }
   if (clocks().core_hz != crystal_core_hz) return;
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;
   rcc_apb1enr() = rcc_apb1enr() | 1U << 25;
@@ -291,7 +313,7 @@ bool can_send(const can::Frame& frame) {
     count(dropped);
     return false;
   }
-  const bool kept = queue.insert({frame, next_number++});
+  const bool kept = queue.insert({identifiers.on_the_bus(frame), next_number++});
   if (!kept) count(dropped);
   refill();
   return kept;
@@ -299,11 +321,12 @@ bool can_send(const can::Frame& frame) {
 
 bool can_receive(can::Frame& frame) {
   service();
-  const std::uint32_t at = taken.load(std::memory_order_relaxed);
-  if (at == received.load(std::memory_order_acquire)) return false;
-  frame = ring[at % ring.size()];
-  taken.store(at + 1, std::memory_order_release);
-  return true;
+  for (std::uint32_t at = taken.load(std::memory_order_relaxed); at != received.load(std::memory_order_acquire);) {
+    frame = ring[at % ring.size()];
+    taken.store(++at, std::memory_order_release);
+    if (identifiers.from_the_bus(frame)) return true;
+  }
+  return false;
 }
 
 CanHealth can_health() {
@@ -340,7 +363,11 @@ extern "C" void can1_rx0_interrupt() {
   if ((status & rf_pending) == 0) return;
   const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
   const std::uint32_t length = box.length_and_time & 15U;
-  bms::can::Frame frame{box.identifier >> 21, static_cast<std::uint8_t>(length < 8 ? length : 8), {}};
+  const bool is_long = (box.identifier & extended) != 0;
+  bms::can::Frame frame{is_long ? box.identifier >> 3 : box.identifier >> 21,
+                        static_cast<std::uint8_t>(length < 8 ? length : 8),
+                        {},
+                        is_long};
   put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
   put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
   stm32f4::can1_rf0r() = rf_release;

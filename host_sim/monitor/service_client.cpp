@@ -29,7 +29,7 @@ std::vector<can::Frame> ServiceClient::frames() {
     case Step::command:
       break;
   }
-  const can::Frame command = command_.frame(command_counter_ = count());
+  const can::Frame command = this->command().frame(command_counter_ = count());
   if (!needs_session_) return {command};
   can::CommandAuthority authority;
   authority.sequence = ++sequence_;
@@ -48,11 +48,13 @@ void ServiceClient::receive(const can::Frame& frame, double now_s) {
   if (frame.id == can::ServiceChallenge::id) return receive_challenge(can::ServiceChallenge::of(frame), now_s);
   if (frame.id != can::CommandAnswer::id || step_ != Step::command) return;
   const auto answer = can::CommandAnswer::of(frame);
-  if (answer.code != command_.code || answer.command_counter != command_counter_) return;
+  if (answer.code != command().code || answer.command_counter != command_counter_) return;
   if (answer.result == can::CommandAnswer::result_not_authorised)
     state_ = State::not_authorised;
   else if (answer.result != can::CommandAnswer::result_done)
     state_ = State::refused;
+  else if (++done_ < commands_.size())
+    go_to(Step::command, now_s);
   else if (needs_session_)
     go_to(Step::close, now_s);
   else

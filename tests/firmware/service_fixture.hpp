@@ -43,8 +43,9 @@ class KeyHolder {
     return m.frame(count());
   }
   /// The two frames of a command in a session.
-  std::array<can::Frame, 2> command(std::uint32_t code, std::uint32_t argument) {
+  std::array<can::Frame, 2> command(std::uint32_t code, std::uint32_t argument, std::uint8_t parameter = 0) {
     can::Command c;
+    c.parameter = parameter;
     c.code = code;
     c.argument = argument;
     const can::Frame frame = c.frame(count());

@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: cb85d5cb6a7ad572bd34e7dc44d32dbebed46705cea72b3fe7719a3a9b496b33
+// SHA-256 of that file: cbb3b6f2fe1e640cf6960e3665f9b3124907fe5e7cd3d9a87857365cf9ff699c
 #pragma once
 
 #include <array>
@@ -1183,13 +1183,19 @@ struct Command {
   static constexpr std::uint32_t code_current_gain = 7;
   static constexpr std::uint32_t code_current_offset = 8;
   static constexpr std::uint32_t code_stored_data = 9;
+  static constexpr std::uint32_t code_read_parameters = 10;
+  static constexpr std::uint32_t code_set_parameter = 11;
+  static constexpr std::uint32_t code_apply_parameters = 12;
   static constexpr SignalLayout argument_layout = {20, 32, false, 1.0F, 0.0F, 0.0F, 4294967295.0F, false, 0};
-  std::uint32_t argument = 0;  ///< clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample.
+  std::uint32_t argument = 0;  ///< clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values.
+  static constexpr SignalLayout parameter_layout = {52, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
+  std::uint32_t parameter = 0;  ///< Number of the parameter for set parameter (ParameterValue), 0 for a new set; otherwise 0.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
     put<code_layout>(out, code);
     put<argument_layout>(out, argument);
+    put<parameter_layout>(out, parameter);
     protect(out, data_id, counter);
     return out;
   }
@@ -1197,6 +1203,7 @@ struct Command {
     Command out;
     out.code = get<code_layout, decltype(out.code)>(frame);
     out.argument = get<argument_layout, decltype(out.argument)>(frame);
+    out.parameter = get<parameter_layout, decltype(out.parameter)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -1204,12 +1211,14 @@ struct Command {
   constexpr void each(See&& see) {
     see("Code", "", code, code_layout);
     see("Argument", "", argument, argument_layout);
+    see("Parameter", "", parameter, parameter_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
   static void each_in_words(See&& see) {
-    { static constexpr std::array<ValueName, 9> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}}}; see("Code", "Command code.", std::span<const ValueName>(names)); }
-    see("Argument", "clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample.", std::span<const ValueName>());
+    { static constexpr std::array<ValueName, 12> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}}}; see("Code", "Command code.", std::span<const ValueName>(names)); }
+    see("Argument", "clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values.", std::span<const ValueName>());
+    see("Parameter", "Number of the parameter for set parameter (ParameterValue), 0 for a new set; otherwise 0.", std::span<const ValueName>());
   }
 };
 
@@ -1230,6 +1239,9 @@ struct CommandAnswer {
   static constexpr std::uint32_t code_current_gain = 7;
   static constexpr std::uint32_t code_current_offset = 8;
   static constexpr std::uint32_t code_stored_data = 9;
+  static constexpr std::uint32_t code_read_parameters = 10;
+  static constexpr std::uint32_t code_set_parameter = 11;
+  static constexpr std::uint32_t code_apply_parameters = 12;
   static constexpr SignalLayout result_layout = {20, 4, false, 1.0F, 0.0F, 0.0F, 15.0F, false, 0};
   std::uint32_t result = 0;  ///< Result of the command.
   static constexpr std::uint32_t result_done = 0;
@@ -1264,7 +1276,7 @@ struct CommandAnswer {
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
   static void each_in_words(See&& see) {
-    { static constexpr std::array<ValueName, 9> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}}}; see("Code", "Code of the command.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 12> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}}}; see("Code", "Code of the command.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 4> names{{ValueName{0, "done"}, ValueName{1, "refused"}, ValueName{2, "no such command"}, ValueName{3, "not authorised"}}}; see("Result", "Result of the command.", std::span<const ValueName>(names)); }
     see("CommandCounter", "Counter of the command.", std::span<const ValueName>());
   }
@@ -2015,6 +2027,10 @@ struct Board {
   std::uint32_t clock_failed = 0;  ///< The crystal does not work and the core runs on its internal oscillator, or its frequency was wrong.
   static constexpr std::uint32_t clock_failed_no = 0;
   static constexpr std::uint32_t clock_failed_yes = 1;
+  static constexpr SignalLayout parameters_lost_layout = {19, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t parameters_lost = 0;  ///< The stored parameters are unreadable, and those of the build are used. Clear faults by a workshop accepts them.
+  static constexpr std::uint32_t parameters_lost_no = 0;
+  static constexpr std::uint32_t parameters_lost_yes = 1;
   static constexpr SignalLayout calendar_layout = {20, 4, false, 1.0F, 0.0F, 0.0F, 14.0F, true, 15};
   std::uint32_t calendar = 0;  ///< State of the real-time clock, which runs while the power is off. Command: set time.
   static constexpr std::uint32_t calendar_none = 0;
@@ -2038,6 +2054,7 @@ struct Board {
     put<supply_low_layout>(out, supply_low);
     put<brown_out_reset_low_layout>(out, brown_out_reset_low);
     put<clock_failed_layout>(out, clock_failed);
+    put<parameters_lost_layout>(out, parameters_lost);
     put<calendar_layout>(out, calendar);
     put<last_exception_layout>(out, last_exception);
     put<stack_free_layout>(out, stack_free);
@@ -2054,6 +2071,7 @@ struct Board {
     out.supply_low = get<supply_low_layout, decltype(out.supply_low)>(frame);
     out.brown_out_reset_low = get<brown_out_reset_low_layout, decltype(out.brown_out_reset_low)>(frame);
     out.clock_failed = get<clock_failed_layout, decltype(out.clock_failed)>(frame);
+    out.parameters_lost = get<parameters_lost_layout, decltype(out.parameters_lost)>(frame);
     out.calendar = get<calendar_layout, decltype(out.calendar)>(frame);
     out.last_exception = get<last_exception_layout, decltype(out.last_exception)>(frame);
     out.stack_free = get<stack_free_layout, decltype(out.stack_free)>(frame);
@@ -2070,6 +2088,7 @@ struct Board {
     see("SupplyLow", "", supply_low, supply_low_layout);
     see("BrownOutResetLow", "", brown_out_reset_low, brown_out_reset_low_layout);
     see("ClockFailed", "", clock_failed, clock_failed_layout);
+    see("ParametersLost", "", parameters_lost, parameters_lost_layout);
     see("Calendar", "", calendar, calendar_layout);
     see("LastException", "", last_exception, last_exception_layout);
     see("StackFree", "byte", stack_free, stack_free_layout);
@@ -2085,6 +2104,7 @@ struct Board {
     { static constexpr std::array<ValueName, 2> names{{ValueName{0, "no"}, ValueName{1, "yes"}}}; see("SupplyLow", "The supply of the controller is below the threshold of its detector.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 2> names{{ValueName{0, "no"}, ValueName{1, "yes"}}}; see("BrownOutResetLow", "The option bytes of the chip let it run at a voltage too low for its flash: boards/porting.md.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 2> names{{ValueName{0, "no"}, ValueName{1, "yes"}}}; see("ClockFailed", "The crystal does not work and the core runs on its internal oscillator, or its frequency was wrong.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 2> names{{ValueName{0, "no"}, ValueName{1, "yes"}}}; see("ParametersLost", "The stored parameters are unreadable, and those of the build are used. Clear faults by a workshop accepts them.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 5> names{{ValueName{0, "none"}, ValueName{1, "never set"}, ValueName{2, "runs"}, ValueName{3, "runs roughly"}, ValueName{15, "not known"}}}; see("Calendar", "State of the real-time clock, which runs while the power is off. Command: set time.", std::span<const ValueName>(names)); }
     see("LastException", "Processor exception that ended the last run: its number in the vector table; 0: none.", std::span<const ValueName>());
     see("StackFree", "Lowest value so far.", std::span<const ValueName>());
@@ -2783,6 +2803,7 @@ struct StoredAction {
   static constexpr std::uint32_t code_voltage_offset = 6;
   static constexpr std::uint32_t code_current_gain = 7;
   static constexpr std::uint32_t code_current_offset = 8;
+  static constexpr std::uint32_t code_apply_parameters = 12;
   static constexpr std::uint32_t code_session_opened = 128;
   static constexpr std::uint32_t code_session_locked = 129;
   static constexpr SignalLayout time_layout = {24, 32, false, 1.0F, 0.0F, 0.0F, 4294967295.0F, false, 0};
@@ -2819,7 +2840,7 @@ struct StoredAction {
   template <class See>
   static void each_in_words(See&& see) {
     see("Index", "0 for the newest.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 8> names{{ValueName{1, "clear faults"}, ValueName{3, "set time"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{128, "session opened"}, ValueName{129, "session locked"}}}; see("Code", "Code of the command; or of the session. 0: no action.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 9> names{{ValueName{1, "clear faults"}, ValueName{3, "set time"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{12, "apply parameters"}, ValueName{128, "session opened"}, ValueName{129, "session locked"}}}; see("Code", "Code of the command; or of the session. 0: no action.", std::span<const ValueName>(names)); }
     see("Time", "Seconds since 1970-01-01 UTC if the calendar ran (above 946684800), else time in operation.", std::span<const ValueName>());
     see("Number", "Number of the action, modulo 256; the same in StoredActionDetail.", std::span<const ValueName>());
   }
@@ -2869,7 +2890,107 @@ struct StoredActionDetail {
   }
 };
 
+/// A parameter of the battery, four frames; on request, Command: read parameters. firmware/parameters/README.md.
+struct ParameterValue {
+  static constexpr const char* name = "ParameterValue";
+  static constexpr std::uint16_t id = 0x1b6;
+  static constexpr std::uint32_t cycle_us = 0;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 438;
+  static constexpr SignalLayout kind_layout = {12, 4, false, 1.0F, 0.0F, 0.0F, 15.0F, false, 0};
+  std::uint32_t kind = 0;  ///< What Value is. Of the block (number 0): its CRC-32, revision and state.
+  static constexpr std::uint32_t kind_value = 0;
+  static constexpr std::uint32_t kind_lowest = 1;
+  static constexpr std::uint32_t kind_highest = 2;
+  static constexpr std::uint32_t kind_initial = 3;
+  static constexpr SignalLayout number_layout = {16, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
+  std::uint32_t number = 0;  ///< Number of the parameter; 0: the block of all parameters.
+  static constexpr std::uint32_t number_block = 0;
+  static constexpr std::uint32_t number_cell_voltage_max = 1;
+  static constexpr std::uint32_t number_cell_voltage_min = 2;
+  static constexpr std::uint32_t number_charge_current_max = 3;
+  static constexpr std::uint32_t number_discharge_current_max = 4;
+  static constexpr std::uint32_t number_temperature_max = 5;
+  static constexpr std::uint32_t number_temperature_min = 6;
+  static constexpr std::uint32_t number_charge_temperature_min = 7;
+  static constexpr std::uint32_t number_voltage_delay = 8;
+  static constexpr std::uint32_t number_temperature_delay = 9;
+  static constexpr std::uint32_t number_capacity = 10;
+  static constexpr std::uint32_t number_shunt = 11;
+  static constexpr std::uint32_t number_precharge_time = 12;
+  static constexpr std::uint32_t number_closing_difference = 13;
+  static constexpr std::uint32_t number_can_bit_rate = 14;
+  static constexpr std::uint32_t number_can_base = 15;
+  static constexpr std::uint32_t number_can_stop = 16;
+  static constexpr std::uint32_t number_canopen_node = 17;
+  static constexpr std::uint32_t number_canopen_charger = 18;
+  static constexpr std::uint32_t number_inputs_fitted = 19;
+  static constexpr SignalLayout value_layout = {24, 32, true, 1.0F, 0.0F, -2147483648.0F, 2147483647.0F, false, 0};
+  std::int32_t value = 0;  ///< In the unit of the parameter.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<kind_layout>(out, kind);
+    put<number_layout>(out, number);
+    put<value_layout>(out, value);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr ParameterValue of(const can::Frame& frame) {
+    ParameterValue out;
+    out.kind = get<kind_layout, decltype(out.kind)>(frame);
+    out.number = get<number_layout, decltype(out.number)>(frame);
+    out.value = get<value_layout, decltype(out.value)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("Kind", "", kind, kind_layout);
+    see("Number", "", number, number_layout);
+    see("Value", "", value, value_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    { static constexpr std::array<ValueName, 4> names{{ValueName{0, "value"}, ValueName{1, "lowest"}, ValueName{2, "highest"}, ValueName{3, "initial"}}}; see("Kind", "What Value is. Of the block (number 0): its CRC-32, revision and state.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 20> names{{ValueName{0, "block"}, ValueName{1, "cell voltage max"}, ValueName{2, "cell voltage min"}, ValueName{3, "charge current max"}, ValueName{4, "discharge current max"}, ValueName{5, "temperature max"}, ValueName{6, "temperature min"}, ValueName{7, "charge temperature min"}, ValueName{8, "voltage delay"}, ValueName{9, "temperature delay"}, ValueName{10, "capacity"}, ValueName{11, "shunt"}, ValueName{12, "precharge time"}, ValueName{13, "closing difference"}, ValueName{14, "can bit rate"}, ValueName{15, "can base"}, ValueName{16, "can stop"}, ValueName{17, "canopen node"}, ValueName{18, "canopen charger"}, ValueName{19, "inputs fitted"}}}; see("Number", "Number of the parameter; 0: the block of all parameters.", std::span<const ValueName>(names)); }
+    see("Value", "In the unit of the parameter.", std::span<const ValueName>());
+  }
+};
+
+/// Current of a battery whose row short circuit is above 655 A, where PackElectrical ends. Of others it is not sent.
+struct PackCurrent {
+  static constexpr const char* name = "PackCurrent";
+  static constexpr std::uint16_t id = 0x18b;
+  static constexpr std::uint32_t cycle_us = 100000;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 395;
+  static constexpr SignalLayout current_layout = {16, 32, true, 0.001F, 0.0F, -2147483.647F, 2147483.647F, true, -2147483648};
+  std::int32_t current = 0;  ///< [A] Positive: charging.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<current_layout>(out, current);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr PackCurrent of(const can::Frame& frame) {
+    PackCurrent out;
+    out.current = get<current_layout, decltype(out.current)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("Current", "A", current, current_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    see("Current", "Positive: charging.", std::span<const ValueName>());
+  }
+};
+
 /// All messages.
-using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail>;
+using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent>;
 
 }  // namespace bms::can
