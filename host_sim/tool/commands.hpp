@@ -25,6 +25,7 @@ std::unique_ptr<Command> flash_command();       ///< writes a board's image onto
 std::unique_ptr<Command> monitor_command();     ///< CAN frames as a screen, a log, a page
 std::unique_ptr<Command> log_command();         ///< what a battery has stored, read over CAN
 std::unique_ptr<Command> service_command();     ///< a command that needs a service session
+std::unique_ptr<Command> update_command();      ///< new firmware over CAN
 std::unique_ptr<Command> image_command();       ///< signed images: keys, signing, checking
 
 }  // namespace bms::tool

@@ -5,6 +5,6 @@
 int main(int argc, char** argv) {
   using namespace bms::tool;
   std::vector<std::unique_ptr<Command>> commands;
-  for (const auto make : {image_command}) commands.push_back(make());
+  for (const auto make : {image_command, update_command}) commands.push_back(make());
   return run_command_line(commands, argc, argv);
 }
