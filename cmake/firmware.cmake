@@ -256,7 +256,26 @@ target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 # bms_image(NAME OBJECTS...)
 # The linker uses the first copy of a function that several objects have: estimator_step, compiled for speed, comes
 # before the objects compiled for size.
+# BMS_SLOT=a or b: the application is linked for a slot of the boot loader (firmware/boot/flash_map.hpp), behind the
+# header of its container. Without it the image starts by itself at every reset.
+set(BMS_SLOT "" CACHE STRING "slot of the boot loader: a or b; empty: an image without a loader")
 set(linker_script ${BMS_LINKER_SCRIPT})
+if(BMS_SLOT)
+  set(slot_a 0x08020800)
+  set(slot_b 0x08060800)
+  if(NOT DEFINED slot_${BMS_SLOT} OR NOT BMS_CHIP STREQUAL stm32f4)
+    message(FATAL_ERROR "BMS_SLOT is ${BMS_SLOT}, expected a or b, of a board with an STM32F405")
+  endif()
+  file(READ ${BMS_LINKER_SCRIPT} script)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${BMS_LINKER_SCRIPT})
+  string(REGEX REPLACE "VECTORS \\(rx\\)[^\n]*" "VECTORS (rx) : ORIGIN = ${slot_${BMS_SLOT}}, LENGTH = 2K" script
+    "${script}")
+  string(REGEX REPLACE "FLASH \\(rx\\)[^\n]*" "FLASH (rx) : ORIGIN = ${slot_${BMS_SLOT}} + 2K, LENGTH = 222K" script
+    "${script}")
+  set(linker_script ${build}/slot_${BMS_SLOT}.ld)
+  file(CONFIGURE OUTPUT ${linker_script} CONTENT "${script}" @ONLY)
+  add_link_options(-Wl,-z,max-page-size=0x800)  # otherwise the header of the ELF file is loaded before the vectors
+endif()
 function(bms_image name)
   add_custom_target(${name}_shared)
   foreach(objects ${ARGN})

@@ -26,5 +26,7 @@ std::unique_ptr<Command> monitor_command();     ///< CAN frames as a screen, a l
 std::unique_ptr<Command> log_command();         ///< what a battery has stored, read over CAN
 std::unique_ptr<Command> service_command();     ///< a command that needs a service session
 std::unique_ptr<Command> parameters_command();  ///< the parameters of a battery, read and set over CAN
+std::unique_ptr<Command> update_command();      ///< new firmware over CAN
+std::unique_ptr<Command> image_command();       ///< signed images: keys, signing, checking
 
 }  // namespace bms::tool

@@ -1,0 +1,70 @@
+// Why an image, or a step of its transfer, is refused. The numbers are sent on CAN (data identifier 0xF1A4 of
+// update_server.hpp), so they never change their meaning.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string_view>
+
+namespace bms::boot {
+
+enum class Refusal : std::uint8_t {
+  none,
+  not_a_header,
+  header_damaged,
+  other_board,
+  other_slot,
+  unknown_key,
+  revoked_key,
+  bad_signature,
+  development_image,
+  older_security,
+  newer_loader_needed,
+  too_large,
+  block_damaged,
+  incomplete,
+  already_running,
+  not_at_rest,
+  not_erased,
+  no_session,
+  flash_failed,
+  trial_failed,
+  not_from_the_other_slot,
+  other_kind,
+  not_confirmed,
+};
+
+/// For a person, in the order of Refusal.
+inline constexpr std::array<std::string_view, 23> refusal_words{
+    "accepted",
+    "this is not an image of this format",
+    "the image's header is inconsistent",
+    "the image is for another board",
+    "the image is for the other slot",
+    "the image is signed with a key that this battery does not have",
+    "the image is signed with a key that was revoked",
+    "the signature of the image is wrong",
+    "this is a development image, and the battery is a product",
+    "the image is older than this battery may run (its security version is below the battery's counter)",
+    "the image needs a newer boot loader",
+    "the image is larger than a slot",
+    "a block of the image does not have the hash that its header states",
+    "the image is not complete",
+    "the battery runs this image already",
+    "the battery is not at rest; open the contactors first",
+    "the slot is not erased",
+    "no service session is open",
+    "the flash could not be written",
+    "the image was started on trial and did not confirm itself",
+    "the image would overwrite the running one",
+    "this slot holds another kind of data",
+    "the running image is still on trial; wait until it has confirmed itself",
+};
+
+constexpr std::string_view words_for(Refusal refusal) {
+  const auto k = static_cast<std::size_t>(refusal);
+  return k < refusal_words.size() ? refusal_words[k] : std::string_view("refused for a reason that this tool lacks");
+}
+
+}  // namespace bms::boot

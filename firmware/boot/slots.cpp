@@ -1,0 +1,117 @@
+#include "boot/slots.hpp"
+
+#include <array>
+
+namespace bms::boot {
+
+namespace {
+
+// Places of the marks, from the end of the slot. Values with as many zeros as ones: an erase or a programming that was
+// interrupted does not produce them from erased or cleared words.
+constexpr std::uint32_t erased_at = 64, sequence_at = 60, complete_at = 56, confirmed_at = 52, rejected_at = 48,
+                        first_trial_at = 44;
+constexpr std::uint32_t erased_mark = 0x96A5'3C1E, complete_mark = 0xC35A'69E1, confirmed_mark = 0x5AC3'961E,
+                        rejected_mark = 0x3CA5'69D2, trial_mark = 0xA53C'D296;
+
+std::uint32_t word_at(SlotFlash& flash, std::uint8_t slot, std::uint32_t from_end) {
+  std::array<std::uint8_t, 4> bytes{};
+  flash.read(slot, flash.slot_bytes() - from_end, bytes);
+  return hal::get_bytes<std::uint32_t>(bytes, 0);
+}
+
+bool set(SlotFlash& flash, std::uint8_t slot, std::uint32_t from_end, std::uint32_t word) {
+  return flash.program(slot, flash.slot_bytes() - from_end, word);
+}
+
+bool set_trial(SlotFlash& flash, std::uint8_t slot, unsigned trial) {
+  return set(flash, slot, first_trial_at - 4 * trial, trial_mark);
+}
+
+/// Why a complete slot may not run although nothing is wrong with its content; sets the mark.
+bool trial_failed(SlotFlash& flash, std::uint8_t slot, const Marks& marks, bool power_on) {
+  if (marks.confirmed || marks.trials == 0 || (power_on && marks.trials < most_trials)) return false;
+  set(flash, slot, rejected_at, rejected_mark);
+  return true;
+}
+
+void settle(SlotFlash& flash, std::uint8_t slot, const Marks& marks, const Header& header) {
+  set(flash, slot, complete_at, complete_mark);
+  if (marks.confirmed) confirm(flash, slot, header.security_version);
+}
+
+}  // namespace
+
+Marks read_marks(SlotFlash& flash, std::uint8_t slot) {
+  Marks m;
+  m.sequence = word_at(flash, slot, sequence_at);
+  m.erased = word_at(flash, slot, erased_at) == erased_mark;
+  m.complete = word_at(flash, slot, complete_at) == complete_mark;
+  m.confirmed = word_at(flash, slot, confirmed_at) == confirmed_mark;
+  m.rejected = word_at(flash, slot, rejected_at) == rejected_mark;
+  while (m.trials < most_trials && word_at(flash, slot, first_trial_at - 4 * m.trials) == trial_mark) ++m.trials;
+  return m;
+}
+
+Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, Header& header) {
+  HeaderBytes bytes{};
+  flash.read(slot, 0, bytes);
+  if (const Refusal r = check_header(bytes, battery, slot, header); r != Refusal::none) return r;
+  std::array<std::uint8_t, 256> part{};
+  for (std::uint32_t block = 0; block < header.blocks(); ++block) {
+    Sha256 hash;
+    for (std::uint32_t at = 0; at < header.block_size(block);) {
+      const auto n = std::min<std::uint32_t>(part.size(), header.block_size(block) - at);
+      flash.read(slot, header_bytes + block * block_bytes + at, std::span(part).first(n));
+      hash.add(std::span(part).first(n));
+      at += n;
+    }
+    if (hash.finish() != stated_hash(bytes, block)) return Refusal::block_damaged;
+  }
+  return Refusal::none;
+}
+
+Start choose(SlotFlash& flash, const Battery& battery, bool power_on) {
+  Start start;
+  const std::array<Marks, 2> marks{read_marks(flash, 0), read_marks(flash, 1)};
+  const bool b_first = marks[1].complete && (!marks[0].complete || marks[1].sequence > marks[0].sequence);
+  for (const std::uint8_t slot : {static_cast<std::uint8_t>(b_first), static_cast<std::uint8_t>(!b_first)}) {
+    const Marks& m = marks[slot];
+    if (!m.complete) continue;
+    Refusal refusal = m.usable() ? Refusal::none : Refusal::trial_failed;
+    if (m.usable() && trial_failed(flash, slot, m, power_on)) {
+      start.returned = true;
+      refusal = Refusal::trial_failed;
+    }
+    if (refusal == Refusal::none) refusal = check_slot(flash, battery, slot, start.header);
+    if (refusal == Refusal::none) {
+      settle(flash, slot, m, start.header);
+      start.trial = !m.confirmed;
+      if (start.trial) set_trial(flash, slot, m.trials);
+      start.slot = slot;
+      start.found = true;
+      return start;
+    }
+    if (start.refusal == Refusal::none) start.refusal = refusal;
+  }
+  return start;
+}
+
+bool confirm(SlotFlash& flash, std::uint8_t slot, std::uint32_t security_version) {
+  return set(flash, slot, confirmed_at, confirmed_mark) && raise_security_counter(flash, security_version);
+}
+
+bool prepare(SlotFlash& flash, std::uint8_t slot) {
+  // 0 may be programmed over any word. An erase that is interrupted does not bring back what was cleared before.
+  if (!set(flash, slot, complete_at, 0) || !set(flash, slot, erased_at, 0) || !flash.erase(slot)) return false;
+  return set(flash, slot, erased_at, erased_mark);
+}
+
+bool begin_writing(SlotFlash& flash, std::uint8_t slot) { return set(flash, slot, erased_at, 0); }
+
+bool complete(SlotFlash& flash, std::uint8_t slot) {
+  const Marks other = read_marks(flash, static_cast<std::uint8_t>(1 - slot));
+  const std::uint32_t sequence = other.complete ? other.sequence + 1 : 1;
+  return set(flash, slot, sequence_at, sequence) && set(flash, slot, complete_at, complete_mark);
+}
+
+}  // namespace bms::boot

@@ -1,0 +1,111 @@
+// The battery's side of an update: a UDS server (ISO 14229-1) with the services of a download. Needs no hardware; the
+// loader uses it while no image runs, the application while it protects.
+//
+//   10 session            01 default, 02 programming; ends after 5 s without a request
+//   27 security access    01: challenge of 6 bytes; 02: operator (2), session_code (4)
+//   (firmware/authentication/codes.hpp);
+//                         a challenge of 0: no key, nothing to prove
+//   22 read               F1A0 board, F1A1 state (StateRecord), F1A4 last refusal (1)
+//   31 routine, 01 start  FF00 erase the target slot; 0203 resume: digest of the header (32), returns the bytes
+//   received;
+//                         FF01 check the slot and make it the next to start
+//   34 request download   00 44 address (4) size (4): the target slot from its begin on, or from where it stopped
+//   36 transfer data      sequence, at most 1,024 bytes
+//   37 transfer exit
+//   11 reset              01
+//   3E tester present     00
+//
+// Numbers are big-endian, as UDS has them. What the battery refuses has the response code 70 or 22; the reason is a
+// Refusal, read by 22 F1A4.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "authentication/codes.hpp"
+#include "boot/iso_tp.hpp"
+#include "boot/receiver.hpp"
+
+namespace bms::boot {
+
+inline constexpr std::uint32_t update_request_id = 0x7B0, update_response_id = 0x7B8;
+
+/// What the server needs of its surroundings.
+class UpdateSurroundings {
+ public:
+  virtual bool at_rest() = 0;             ///< contactors open, no request for power
+  virtual std::uint64_t challenge() = 0;  ///< never the same again; 48 bits, not 0
+  virtual void restart() = 0;             ///< after the answer was sent
+
+ protected:
+  ~UpdateSurroundings() = default;
+};
+
+/// What runs, as 22 F1A1 sends it: running slot (0xFF: none), trial (1), last start returned (1), version (4), cell
+/// hash (4), security counter (4), loader version (4), bytes received (4).
+inline constexpr std::size_t state_record_bytes = 23;
+
+class UpdateServer {
+ public:
+  static constexpr std::uint64_t session_us = 5'000'000, locked_us = 600'000'000;
+  static constexpr unsigned most_wrong_keys = 3;
+
+  UpdateServer(SlotFlash& flash, const Battery& battery, const Start& started,
+               const std::optional<authentication::Key>& service_key, UpdateSurroundings& surroundings)
+      : receiver_(flash, battery, started.found ? started.slot : 2),
+        battery_(battery),
+        started_(started),
+        key_(service_key),
+        surroundings_(surroundings) {}
+
+  /// Returns the answer, empty if none is to be sent. `room` has at least longest_answer bytes.
+  static constexpr std::size_t longest_answer = 64;
+  std::span<const std::uint8_t> answer(std::span<const std::uint8_t> request, std::span<std::uint8_t> room,
+                                       std::uint64_t now_us);
+  /// Returns true if the answer takes so long that "response pending" comes first.
+  static bool takes_long(std::span<const std::uint8_t> request);
+  /// Returns true once after an accepted reset; the caller sends the answer and calls restart().
+  bool restart_due() const { return restart_; }
+  Refusal last_refusal() const { return refusal_; }
+  const Receiver& receiver() const { return receiver_; }
+
+ private:
+  class Answer;
+  void session(std::span<const std::uint8_t> request, Answer& answer, std::uint64_t now_us);
+  void security(std::span<const std::uint8_t> request, Answer& answer, std::uint64_t now_us);
+  void read(std::span<const std::uint8_t> request, Answer& answer) const;
+  void routine(std::span<const std::uint8_t> request, Answer& answer);
+  void request_download(std::span<const std::uint8_t> request, Answer& answer);
+  void transfer(std::span<const std::uint8_t> request, Answer& answer);
+  void refuse(Answer& answer, Refusal why);
+  bool unlocked() const { return programming_ && (unlocked_ || !key_); }
+
+  Receiver receiver_;
+  const Battery& battery_;
+  Start started_;
+  std::optional<authentication::Key> key_;
+  UpdateSurroundings& surroundings_;
+  bool programming_ = false, unlocked_ = false, restart_ = false, download_ = false, exited_ = false;
+  std::uint64_t since_us_ = 0, challenge_ = 0, locked_since_us_ = 0;
+  unsigned wrong_ = 0;
+  std::uint32_t blocks_ = 0;  ///< of this download
+  Refusal refusal_ = Refusal::none;
+};
+
+/// Server and transport together: frames in, frames out.
+class UpdateNode {
+ public:
+  UpdateNode(UpdateServer& server, UpdateSurroundings& surroundings) : server_(server), surroundings_(surroundings) {}
+  void receive(const can::Frame& frame, std::uint64_t now_us) { transport_.receive(frame, now_us); }
+  /// The next frame to send; works on what has arrived. Call it until it returns false.
+  bool next_frame(can::Frame& frame, std::uint64_t now_us);
+
+ private:
+  UpdateServer& server_;
+  UpdateSurroundings& surroundings_;
+  IsoTp transport_{update_response_id, update_request_id};
+  bool pending_sent_ = false;
+};
+
+}  // namespace bms::boot

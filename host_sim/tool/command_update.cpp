@@ -1,0 +1,103 @@
+// bms update: new firmware for a battery, over its CAN bus (host_sim/update/update_run.hpp).
+#include <memory>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "files/bad_input.hpp"
+#include "monitor/frame_source.hpp"
+#include "tool/commands.hpp"
+#include "tool/key_file.hpp"
+#include "tool/options.hpp"
+#include "tool/progress.hpp"
+#include "update/update_run.hpp"
+
+namespace bms::tool {
+
+namespace {
+
+using update::UpdateResult;
+
+struct UpdateOptions {
+  std::string source, image, key;
+  unsigned operator_number = 0;
+  double wait_s = 90;
+  Output output;
+};
+
+const char* words(UpdateResult::Outcome outcome) {
+  switch (outcome) {
+    case UpdateResult::Outcome::done:
+      return "done";
+    case UpdateResult::Outcome::returned:
+      return "returned";
+    default:
+      return "refused";
+  }
+}
+
+class UpdateCommand final : public Command {
+ public:
+  CLI::App* add(CLI::App& app) override {
+    CLI::App& c = *app.add_subcommand("update", "Send new firmware to a battery over CAN and start it");
+    c.footer("Example: bms update can0 update.bms --key pack17.key --operator 42");
+    c.add_option("source", o_.source, "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter")->required();
+    c.add_option("image", o_.image, "signed images, from bms image sign")->required()->check(not_empty());
+    c.add_option("--key", o_.key, "device key of this battery, 32 hexadecimal digits")
+        ->check(not_empty())
+        ->type_name("FILE");
+    c.add_option("--operator", o_.operator_number, "who answers for it")->check(Within(0, 65'535));
+    c.add_option("--wait", o_.wait_s, "seconds for the new image to confirm itself")->check(Within(1, 3'600));
+    add_json(c, o_.output);
+    return &c;
+  }
+
+  int run() override {
+    update::UpdateWish wish;
+    wish.containers = update::read_containers(o_.image);
+    if (!o_.key.empty()) wish.device_key = read_key(o_.key);
+    wish.operator_number = static_cast<std::uint16_t>(o_.operator_number);
+    wish.start_wait_s = o_.wait_s;
+    const auto shown = progress_on_stderr(0.5, [](double done, double left_s, const std::string&) {
+      return fmt::format("sending: {:.0f} %, {:.0f} s left", 100 * done, left_s);
+    });
+    if (shown && !o_.output.quiet)
+      wish.progress = [&shown](std::uint32_t done, std::uint32_t of) { shown(static_cast<double>(done) / of, ""); };
+    const UpdateResult result = send(wish);
+    const nlohmann::ordered_json json{{"command", "update"},
+                                      {"from", result.from},
+                                      {"to", result.to},
+                                      {"seconds", result.seconds},
+                                      {"bytes_sent", result.sent},
+                                      {"resumed_at", result.resumed_at},
+                                      {"result", words(result.outcome)},
+                                      {"reason", result.reason}};
+    if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(2) + "\n");
+    const bool done = result.outcome == UpdateResult::Outcome::done;
+    if (done)
+      print_summary(o_.output, fmt::format("{}: {} runs, {} before; {} bytes in {:.1f} s\n", o_.source, result.to,
+                                           result.from, result.sent, result.seconds));
+    else
+      fmt::print(stderr, "{}: {}: {}\n", o_.source, words(result.outcome), result.reason);
+    return done ? 0 : 1;
+  }
+
+ private:
+  UpdateResult send(const update::UpdateWish& wish) const {
+    try {
+      const auto source = monitor::open_source(o_.source);
+      if (!source->live()) throw files::BadInput(o_.source, 1, "is a recording, expected a bus with the battery");
+      return update::run_update(*source, wish);
+    } catch (const monitor::SourceError& error) {
+      throw files::BadInput(error.source, error.line, error.what());
+    }
+  }
+
+  UpdateOptions o_;
+};
+
+}  // namespace
+
+std::unique_ptr<Command> update_command() { return std::make_unique<UpdateCommand>(); }
+
+}  // namespace bms::tool

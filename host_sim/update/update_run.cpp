@@ -1,0 +1,230 @@
+#include "update/update_run.hpp"
+
+#include <array>
+#include <chrono>
+
+#include <fmt/format.h>
+
+#include "boot/flash_map.hpp"
+
+namespace bms::update {
+
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using Bytes = Link::Bytes;
+
+constexpr std::size_t piece_bytes = 1'024;
+constexpr int most_tries = 5;
+constexpr std::uint8_t negative = 0x7F, pending = 0x78;
+
+std::uint64_t now_us() {
+  return static_cast<std::uint64_t>(
+      std::chrono::duration_cast<std::chrono::microseconds>(Clock::now().time_since_epoch()).count());
+}
+
+std::uint32_t big(const Bytes& bytes, std::size_t at, std::size_t size) {
+  std::uint32_t value = 0;
+  for (std::size_t k = 0; k < size; ++k) value = value << 8 | bytes.at(at + k);
+  return value;
+}
+
+void put(Bytes& to, std::uint32_t value, std::size_t size) {
+  for (std::size_t k = size; k > 0; --k) to.push_back(static_cast<std::uint8_t>(value >> 8 * (k - 1)));
+}
+
+/// What ends an update: the reason in words.
+struct Refused {
+  std::string reason;
+};
+
+class Update {
+ public:
+  Update(monitor::FrameSource& source, const UpdateWish& wish) : link_(source), wish_(wish) {}
+
+  UpdateResult run() {
+    const auto begin = Clock::now();
+    try {
+      const auto before = read_state(link_);
+      if (!before) throw Refused{"no battery answers, or it has no boot loader"};
+      state_ = *before;
+      result_.from = version_text(state_.version);
+      choose();
+      result_.to = version_text(chosen_->header.version);
+      open_session();
+      send();
+      restart();
+    } catch (const Refused& refused) {
+      result_.reason = refused.reason;
+    }
+    result_.seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+    return result_;
+  }
+
+ private:
+  /// What no battery would accept is not sent.
+  void choose() {
+    const std::uint8_t target = state_.running == std::uint8_t{0} ? 1 : 0;
+    for (const Container& c : wish_.containers) {
+      if (c.header.slot == target) chosen_ = &c;
+    }
+    if (chosen_ == nullptr)
+      throw Refused{fmt::format("the file has no image for slot {}, which is the free one", target == 0 ? "A" : "B")};
+    if (chosen_->header.board_name() != state_.board)
+      throw Refused{
+          fmt::format("the image is for {}, the battery is a {}", chosen_->header.board_name(), state_.board)};
+  }
+
+  /// The positive answer; otherwise ends the update with the battery's reason.
+  Bytes expect(const Bytes& message, int wait_ms = 1'500) {
+    for (int tries = 0; tries < most_tries; ++tries) {
+      const auto answer = link_.request(message, wait_ms);
+      if (!answer) continue;
+      if (answer->at(0) == (message[0] | 0x40)) return *answer;
+      if (answer->size() == 3 && (*answer)[0] == negative) throw Refused{reason((*answer)[2])};
+    }
+    throw Refused{"the battery does not answer any more; send again, the transfer resumes"};
+  }
+
+  std::string reason(std::uint8_t code) {
+    if (code == 0x35) return "the key is not that of this battery";
+    if (code == 0x36 || code == 0x37) return "too many wrong keys; the battery accepts the next one after ten minutes";
+    if (code == 0x22 || code == 0x70) {
+      const auto why = link_.request({0x22, 0xF1, 0xA4});
+      if (why && why->size() == 4) return std::string(boot::words_for(static_cast<boot::Refusal>((*why)[3])));
+    }
+    return fmt::format("the battery refuses with UDS response code {:#04x}", code);
+  }
+
+  void open_session() {
+    expect({0x10, 0x02});
+    const Bytes seed = expect({0x27, 0x01});
+    const std::uint64_t challenge = static_cast<std::uint64_t>(big(seed, 2, 2)) << 32 | big(seed, 4, 4);
+    if (challenge == 0) return;
+    if (!wish_.device_key) throw Refused{"the battery wants its key, give it with --key"};
+    const authentication::Cmac service(authentication::role_key(*wish_.device_key, authentication::Role::service));
+    Bytes answer{0x27, 0x02};
+    put(answer, wish_.operator_number, 2);
+    put(answer, authentication::session_code(service, challenge, wish_.operator_number), 4);
+    expect(answer);
+  }
+
+  /// Bytes that the battery has of this container already, after a lost connection.
+  std::uint32_t resumed() {
+    Bytes ask{0x31, 0x01, 0x02, 0x03};
+    const auto header = chosen_->header_bytes();
+    for (const std::uint8_t byte : boot::sha256(header)) ask.push_back(byte);
+    return big(expect(ask), 4, 4);
+  }
+
+  void send() {
+    const auto size = static_cast<std::uint32_t>(chosen_->bytes.size());
+    std::uint32_t at = resumed();
+    result_.resumed_at = at;
+    if (at == 0) expect({0x31, 0x01, 0xFF, 0x00}, 10'000);
+    Bytes download{0x34, 0x00, 0x44};
+    put(download, boot::application_slots[chosen_->header.slot] + at, 4);
+    put(download, size, 4);
+    expect(download);
+    std::uint8_t sequence = 0;
+    while (at < size) {
+      const std::size_t bytes = std::min<std::size_t>(piece_bytes, size - at);
+      Bytes piece{0x36, ++sequence};
+      piece.insert(piece.end(), chosen_->bytes.begin() + at, chosen_->bytes.begin() + at + static_cast<long>(bytes));
+      expect(piece);
+      at += static_cast<std::uint32_t>(bytes);
+      result_.sent += static_cast<std::uint32_t>(bytes);
+      wish_.progress(at, size);
+    }
+    expect({0x37});
+    expect({0x31, 0x01, 0xFF, 0x01}, 10'000);
+  }
+
+  /// Restarts the battery and reads what runs until the trial is over.
+  void restart() {
+    expect({0x11, 0x01});
+    const auto end = Clock::now() + std::chrono::duration<double>(wish_.start_wait_s);
+    while (Clock::now() < end) {
+      const auto now = read_state(link_);
+      if (!now || now->trial) continue;
+      if (now->running == chosen_->header.slot && now->version == chosen_->header.version) {
+        result_.outcome = UpdateResult::Outcome::done;
+        return;
+      }
+      if (now->returned || now->running == state_.running) {
+        result_.outcome = UpdateResult::Outcome::returned;
+        result_.reason = "the new image did not confirm itself; the old one runs again";
+        return;
+      }
+    }
+    throw Refused{"the new image was started and has not confirmed itself yet"};
+  }
+
+  Link link_;
+  const UpdateWish& wish_;
+  BatteryState state_;
+  const Container* chosen_ = nullptr;
+  UpdateResult result_;
+};
+
+}  // namespace
+
+void Link::pump(int wait_ms) {
+  can::Frame frame;
+  while (transport_.next_frame(frame, now_us())) {
+    if (!source_.send(frame)) break;
+  }
+  if (arrived_.empty()) {
+    std::array<monitor::BusFrame, 64> room{};
+    const std::size_t n = source_.read(room, wait_ms);
+    for (std::size_t k = 0; k < n; ++k) {
+      if (room[k].kind == monitor::FrameKind::standard) arrived_.push_back(to_can_frame(room[k]));
+    }
+  }
+  // "Response pending" and the response may come in one reading, and the transport has room for one message.
+  for (; !arrived_.empty() && transport_.message().empty(); arrived_.pop_front())
+    transport_.receive(arrived_.front(), now_us());
+}
+
+std::optional<Bytes> Link::request(const Bytes& message, int wait_ms) {
+  transport_.taken();  // of an earlier request that was given up
+  auto until = Clock::now() + std::chrono::milliseconds(wait_ms);
+  transport_.send(message, now_us());
+  while (Clock::now() < until && !source_.ended()) {
+    pump(5);
+    const auto answer = transport_.message();
+    if (answer.empty()) continue;
+    const Bytes bytes(answer.begin(), answer.end());
+    transport_.taken();
+    const bool negative_answer = bytes.size() == 3 && bytes[0] == negative;
+    if (negative_answer && bytes[1] == message[0] && bytes[2] == pending) {
+      until = Clock::now() + std::chrono::seconds(10);
+      continue;
+    }
+    const bool ours = negative_answer ? bytes[1] == message[0] : bytes[0] == (message[0] | 0x40);
+    if (ours) return bytes;
+  }
+  return std::nullopt;
+}
+
+std::optional<BatteryState> read_state(Link& link) {
+  const auto board = link.request({0x22, 0xF1, 0xA0});
+  if (!board || board->size() < 4 || (*board)[0] != 0x62) return std::nullopt;
+  const auto state = link.request({0x22, 0xF1, 0xA1});
+  if (!state || state->size() != 3 + boot::state_record_bytes || (*state)[0] != 0x62) return std::nullopt;
+  BatteryState s;
+  s.board.assign(board->begin() + 3, board->end());
+  if ((*state)[3] < 2) s.running = (*state)[3];
+  s.trial = (*state)[4] != 0;
+  s.returned = (*state)[5] != 0;
+  s.version = big(*state, 6, 4);
+  s.cell_hash = big(*state, 10, 4);
+  s.security_counter = big(*state, 14, 4);
+  s.loader = big(*state, 18, 4);
+  s.received = big(*state, 22, 4);
+  return s;
+}
+
+UpdateResult run_update(monitor::FrameSource& source, const UpdateWish& wish) { return Update(source, wish).run(); }
+
+}  // namespace bms::update

@@ -1,0 +1,65 @@
+// One update of one battery: asks what runs, sends the container for the other slot, starts it, and waits for what the
+// battery says afterwards. Services: firmware/boot/update_server.hpp.
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "authentication/codes.hpp"
+#include "boot/iso_tp.hpp"
+#include "boot/update_server.hpp"
+#include "monitor/frame_source.hpp"
+#include "update/container_file.hpp"
+
+namespace bms::update {
+
+/// Messages to the battery and back. Times are those of the steady clock.
+class Link {
+ public:
+  explicit Link(monitor::FrameSource& source) : source_(source) {}
+
+  using Bytes = std::vector<std::uint8_t>;
+  /// The answer; "response pending" is waited for. Nothing if the battery is silent for wait_ms.
+  std::optional<Bytes> request(const Bytes& message, int wait_ms = 1'500);
+
+ private:
+  void pump(int wait_ms);
+
+  monitor::FrameSource& source_;
+  std::deque<can::Frame> arrived_;
+  boot::IsoTp transport_{boot::update_request_id, boot::update_response_id};
+};
+
+/// What a battery says about itself.
+struct BatteryState {
+  std::string board;
+  std::optional<std::uint8_t> running;  ///< slot; nothing: the loader waits
+  bool trial = false, returned = false;
+  std::uint32_t version = 0, cell_hash = 0, security_counter = 0, loader = 0, received = 0;
+};
+
+struct UpdateWish {
+  std::vector<Container> containers;
+  std::optional<authentication::Key> device_key;
+  std::uint16_t operator_number = 0;
+  double start_wait_s = 90;  ///< for the new image to confirm itself
+  std::function<void(std::uint32_t done, std::uint32_t of)> progress = [](std::uint32_t, std::uint32_t) {};
+};
+
+struct UpdateResult {
+  enum class Outcome { done, refused, returned } outcome = Outcome::refused;
+  std::string from, to, reason;
+  double seconds = 0;
+  std::uint32_t sent = 0, resumed_at = 0;  ///< bytes
+};
+
+/// Nothing if there is no battery with an update server.
+std::optional<BatteryState> read_state(Link& link);
+
+UpdateResult run_update(monitor::FrameSource& source, const UpdateWish& wish);
+
+}  // namespace bms::update
