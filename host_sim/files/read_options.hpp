@@ -31,6 +31,7 @@ struct ReadOptions {
   std::string channel;              ///< the only channel of a CAN log that is read; empty: any
   std::size_t cells_in_series = 0;  ///< divides a pack voltage; 0: unknown
   bool refuse_doubtful = false;     ///< an inverted current and impossible readings are errors, not warnings
+  std::string steps, cycles;        ///< "3:7": only rows of these steps or cycles of a tester; empty: all
   bool keep_all = false;            ///< columns without a meaning here are kept in Recording::others
   std::map<std::string, measurement::Recording> in_memory;  ///< by path: used in place of such a file
 };

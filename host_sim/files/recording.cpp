@@ -10,6 +10,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/logs/frame_log.hpp"
+#include "files/logs/long_table.hpp"
 #include "files/logs/table_reader.hpp"
 #include "measurement/recording_checks.hpp"
 #include "measurement/statistics.hpp"
@@ -31,10 +32,9 @@ std::string impossible(const Recording& r) {
   double soc = 0;
   for (const double s : r.soc_ref) soc = s > soc ? s : soc;
   if (soc > 1.5) {
-    return fmt::format(
-        "soc_ref reaches {:g}: it looks like percent, expected a fraction from 0 to 1: "
-        "--unit soc_ref=%",
-        soc);
+    const bool fine = soc > 10'000;  // LeafSpy has ten thousandths of a percent
+    return fmt::format("soc_ref reaches {:g}: it looks like {}, expected a fraction from 0 to 1: --unit soc_ref={}",
+                       soc, fine ? "ten thousandths of a percent" : "percent", fine ? "ppm" : "%");
   }
   if (soc > largest_soc) {
     return fmt::format(
@@ -96,8 +96,14 @@ Recording read_recording(const std::string& path, VoltageColumn voltage, const R
   const auto begin = std::chrono::steady_clock::now();
   std::size_t bytes = 0;
   Recording recording;
-  if (frame_format_of(path, options)) {
+  const bool frames = frame_format_of(path, options).has_value();
+  if (frames && !(options.steps + options.cycles).empty())
+    throw BadInput(path, 1, "a log of CAN frames has no steps and cycles, expected neither --steps nor --cycles");
+  if (frames) {
     recording = read_frame_log(path, options, bytes);
+    check(recording, options);
+  } else if (options.format.empty() && is_console(path)) {
+    recording = read_console(path, options, bytes);
     check(recording, options);
   } else {
     TextLines lines(path);

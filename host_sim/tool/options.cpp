@@ -65,7 +65,11 @@ void add_reading(CLI::App& c, files::ReadOptions& o) {
   c.add_option("--separator", o.separator, "between columns: one character, or tab")->type_name("CHAR")->group(group);
   c.add_flag("--decimal-comma", o.decimal_comma, "numbers as 3,3")->group(group);
   c.add_flag("--day-first", o.day_first, "dates as 31/12/2026")->group(group);
-  c.add_option("--dbc", o.dbc, "DBC file of the frames of a CAN log")->type_name("FILE")->group(group);
+  c.add_option("--steps", o.steps, "only rows of these steps of a tester: 3:7")->type_name("A:B")->group(group);
+  c.add_option("--cycles", o.cycles, "only rows of these cycles of a tester: 1:2")->type_name("A:B")->group(group);
+  c.add_option("--dbc", o.dbc, "DBC file of the frames of a CAN log, or pylontech for batteries with such frames")
+      ->type_name("FILE")
+      ->group(group);
   c.add_option("--channel", o.channel, "channel of a CAN log with several: can0, 1")->type_name("NAME")->group(group);
   c.add_option("--series", o.cells_in_series, "cells in series, to get a cell's voltage from pack_voltage_v")
       ->type_name("N")

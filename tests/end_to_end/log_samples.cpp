@@ -344,7 +344,90 @@ void add_impossible(std::vector<Sample>& all) {
   all.push_back({"BioLogic .mpr", "log.mpr", "BIO-LOGIC MODULAR FILE\x1A", "", Answer::refused, "export it as text"});
 }
 
+/// What apps and devices at home and in cars write: no unit in the names, cells next to the pack, rows of their own.
+void add_apps(std::vector<Sample>& all) {
+  const std::string leaf =
+      lines("Date/Time,Gids,SOC,Pack Volts,Pack Amps,Max CP mV,CP1,CP2,VIN", [](std::size_t k, const Row& r) {
+        return fmt::format("03/04/2024 07:30:{:02},200,620000,{:.2f},{:.3f},3303,{:.0f},{:.0f},X", k, 2 * r.voltage_v,
+                           -r.current_a, 1e3 * r.voltage_v, 1e3 * r.voltage_v);
+      });
+  all.push_back({"LeafSpy", "leafspy.csv", leaf, "--discharge-positive", Answer::read, "v_2 from 'CP2' in mV", 6e-4});
+  all.push_back({"LeafSpy, its SOC in ten thousandths of a percent", "leafspy_soc.csv", leaf,
+                 "--discharge-positive --map soc_ref=SOC --unit soc_ref=ppm", Answer::read, "soc_ref from 'SOC' in ppm",
+                 6e-4});
+  all.push_back({"one unit for all cells", "cells_mv.csv",
+                 lines("time_s,current_a,U1,U2",
+                       [](std::size_t, const Row& r) {
+                         return fmt::format("{},{},{:.1f},{:.1f}", r.time_s, r.current_a, 1e3 * r.voltage_v,
+                                            1e3 * r.voltage_v);
+                       }),
+                 "--map 'v_*=U*' --unit 'v_*=mV'", Answer::read, "v_2 from 'U2' in mV"});
+  all.push_back({"Scan My Tesla, cells in rows of their own", "tesla.csv",
+                 lines("Time,Battery voltage,Battery current,SOC,Cell temp min,Cell  1 voltage,Cell  2 voltage,",
+                       [](std::size_t, const Row& r) {
+                         return fmt::format("{:.0f},{:.2f},{:.2f},60,,,,\n{:.0f},,,,21,{:.4f},{:.4f},", 1e3 * r.time_s,
+                                            2 * r.voltage_v, r.current_a, 1e3 * r.time_s + 210, r.voltage_v,
+                                            r.voltage_v);
+                       }),
+                 "", Answer::read, "current and voltages are in different rows: 60 of 120"});
+  all.push_back({"the pack's voltage as voltage_v next to its cells", "sum.csv",
+                 lines("time_s,current_a,voltage_v,v_1,v_2,v_3",
+                       [](std::size_t, const Row& r) {
+                         return fmt::format("{},{},{},{},{},{}", r.time_s, r.current_a, 3 * r.voltage_v, r.voltage_v,
+                                            r.voltage_v, r.voltage_v);
+                       }),
+                 "", Answer::read, "it is used as pack_voltage_v"});
+  all.push_back({"console of ESPHome over midnight", "esphome.log",
+                 "[23:58:00][I][app:102]: ESPHome version 2024.6\n" +
+                     lines("[23:58:01][C][logger:185]: Logger:",
+                           [](std::size_t k, const Row& r) {
+                             const double s = k < 30 ? 86'340 + 2.0 * r.time_s : 2.0 * r.time_s - 60;
+                             const std::string head = "[" + clock_text(s) + "][D][sensor:125]: '";
+                             return fmt::format(
+                                 "{0}bms current': Sending state {1:.5f} A with 2 decimals of accuracy\n"
+                                 "{0}bms cell voltage 1': Sending state {2:.5f} V with 3 decimals of accuracy",
+                                 head, r.current_a, r.voltage_v);
+                           }),
+                 "", Answer::read, "v_1 from 'bms cell voltage 1'"});
+  all.back().time_factor = 2;
+}
+
+void add_steps(std::vector<Sample>& all) {
+  const auto steps = [](int first) {
+    std::string text = "Test_Time(s),Step_Index,Cycle_Index,Current(A),Voltage(V)\n";
+    for (int k = 0; k < 20; ++k) text += fmt::format("{},{},1,0,3.3\n", k - 40, first - 1);
+    for (const Row& r : signal()) {
+      text += fmt::format("{},{},1,{},{:.6f}\n", r.time_s, first + static_cast<int>(r.time_s) / 30, r.current_a,
+                          r.voltage_v);
+    }
+    for (int k = 0; k < 20; ++k) text += fmt::format("{},{},2,0,3.3\n", 100 + k, first + 1);
+    return text;
+  };
+  all.push_back({"two steps of the first cycle of a test", "steps.csv", steps(3), "--steps 3:4 --cycles 1",
+                 Answer::read, "only steps 3 to 4 of 'Step_Index'; only cycles 1 to 1"});
+  all.push_back({"steps of a table that has none", "no_steps.csv", plain("time_s,current_a,voltage_v"), "--steps 3:4",
+                 Answer::refused, "no column with the number of the step"});
+}
+
+/// A battery with the frames of Pylontech: 16 cells.
+std::string pylontech() {
+  std::string text;
+  for (const Row& r : signal()) {
+    const int v = static_cast<int>(std::lround(1600 * r.voltage_v)),
+              a = static_cast<int>(std::lround(10 * r.current_a)),
+              c = static_cast<int>(std::lround(10 * r.temperature_c));
+    const auto low = [](int x) { return static_cast<unsigned>(x) & 0xFF; };
+    const auto high = [](int x) { return static_cast<unsigned>(x) >> 8 & 0xFF; };
+    text += fmt::format("({:.6f}) can0 351#1402D007D007BE01\n({:.6f}) can0 355#3C006300\n", r.time_s, r.time_s + 0.01);
+    text += fmt::format("({:.6f}) can0 356#{:02X}{:02X}{:02X}{:02X}{:02X}{:02X}\n", r.time_s + 0.02, low(v), high(v),
+                        low(a), high(a), low(c), high(c));
+  }
+  return text;
+}
+
 void add_frames(std::vector<Sample>& all) {
+  all.push_back({"a battery with the frames of Pylontech or Victron", "pylontech.log", pylontech(),
+                 "--dbc pylontech --series 16", Answer::read, "current_a from Measured.Current", 6e-4, 0.051});
   const std::string candump = frames([](double t, const auto& b) {
     return fmt::format("({:.6f}) can0 123#{:02X}{:02X}{:02X}{:02X}", t, b[0], b[1], b[2], b[3]);
   });
@@ -368,6 +451,50 @@ void add_frames(std::vector<Sample>& all) {
                  bus, Answer::read, "gvret", step_v});
   all.push_back({"a signal that the DBC file lacks", "other.log", candump, "--dbc bus.dbc --map current_a=Speed",
                  Answer::refused, "no signal 'Speed'"});
+}
+
+void add_frames_of_tools(std::vector<Sample>& all) {
+  const double step_v = 6e-4;
+  const auto trace = [](const char* version, const char* head, const char* columns) {
+    std::size_t count = 0;
+    return Sample{std::string("PEAK trace ") + version,
+                  std::string("trace_") + version[0] + version[2] + ".trc",
+                  frames(
+                      [&](double t, const auto& b) {
+                        return fmt::format("{:6}{} {:11.3f} {} {}", ++count, head[14] == '1' ? ")" : "", 1e3 * t,
+                                           columns, spaced(b));
+                      },
+                      head + std::string("\n;$STARTTIME=44128.5647\n;\n;---+--   ----+----  --+--\n")),
+                  bus,
+                  Answer::read,
+                  "trc",
+                  6e-4};
+  };
+  all.push_back(trace("1.0", ";$FILEVERSION=1.0", "0123  4 "));
+  all.push_back(trace("1.1", ";$FILEVERSION=1.1", "Rx         0123  4 "));
+  all.push_back(trace("1.3", ";$FILEVERSION=1.3", "1  Rx        0123 -  4   "));
+  all.push_back(trace("2.0", ";$FILEVERSION=2.0\n;$COLUMNS=N,O,T,I,d,l,D", "DT     0123 Rx 4  "));
+  all.push_back(trace("2.1", ";$FILEVERSION=2.1\n;$COLUMNS=N,O,T,B,I,d,R,L,D", "FB 1      0123 Rx -  4    "));
+  const auto busmaster = [](const char* modes, double start_s, bool relative, bool decimal) {
+    double last_s = relative ? 0 : -start_s;
+    return frames(
+        [=](double t, const auto& b) mutable {
+          const double s = t - last_s;
+          if (relative) last_s = t;
+          const double of_day = s >= 86'400 ? s - 86'400 : s;
+          const std::string bytes = decimal ? fmt::format("{} {} {} {}", b[0], b[1], b[2], b[3]) : spaced(b);
+          return fmt::format("{:02}:{:02}:{:02}:{:04} Rx 1 {} s 4 {} ", static_cast<int>(of_day) / 3'600,
+                             static_cast<int>(of_day) / 60 % 60, static_cast<int>(of_day) % 60,
+                             static_cast<int>(std::lround(std::fmod(of_day, 1.0) * 1e4)), decimal ? "291" : "0x123",
+                             bytes);
+        },
+        std::string("***BUSMASTER Ver 3.2.2***\n***PROTOCOL CAN***\n***[START LOGGING SESSION]***\n") + modes);
+  };
+  all.push_back({"BUSMASTER, system clock over midnight", "busmaster.log",
+                 busmaster("***HEX***\n***SYSTEM MODE***\n", 86'370, false, false), bus, Answer::read, "busmaster",
+                 step_v});
+  all.push_back({"BUSMASTER, decimal, time since the frame above", "relative.log",
+                 busmaster("***DEC***\n***RELATIVE MODE***\n", 0, true, true), bus, Answer::read, "busmaster", step_v});
 }
 
 }  // namespace
@@ -394,7 +521,10 @@ std::vector<Sample> samples() {
   add_tables(all);
   add_times_and_encodings(all);
   add_impossible(all);
+  add_apps(all);
+  add_steps(all);
   add_frames(all);
+  add_frames_of_tools(all);
   return all;
 }
 

@@ -25,6 +25,7 @@ struct Sample {
   double voltage_step_v = 5e-4;  ///< resolution of the file
   double current_step_a = 5e-3;
   std::size_t missing_rows = 0;  ///< at the end
+  double time_factor = 1;        ///< the file's time is so many times that of the signal
 };
 std::vector<Sample> samples();
 

@@ -13,6 +13,7 @@
 #include "files/logs/frame_text.hpp"
 #include "files/logs/log_formats.hpp"
 #include "files/logs/own_frames.hpp"
+#include "files/logs/shipped_dbc.hpp"
 #include "files/logs/text_lines.hpp"
 #include "files/logs/units.hpp"
 
@@ -63,7 +64,7 @@ std::string column_of(const ListedSignal& s) {
 class Lister {
  public:
   explicit Lister(const ReadOptions& options)
-      : options_(options), dbc_(options.dbc.empty() ? own_signals() : read_dbc(options.dbc)) {
+      : options_(options), dbc_(options.dbc.empty() ? own_signals() : signals_of(options.dbc)) {
     for (const DbcSignal& s : dbc_) multiplexors_.push_back(multiplexors_if_any(s));
   }
 

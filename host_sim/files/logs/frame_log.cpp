@@ -14,6 +14,7 @@
 #include "files/logs/own_frames.hpp"
 #include "files/logs/paired_column.hpp"
 #include "files/logs/recording_columns.hpp"
+#include "files/logs/shipped_dbc.hpp"
 #include "files/logs/table_layout.hpp"
 #include "files/logs/table_reader.hpp"
 #include "files/logs/text_lines.hpp"
@@ -23,7 +24,6 @@ namespace bms::files {
 
 namespace {
 
-constexpr std::array frame_formats = {"candump", "battery-emulator", "asc", "gvret"};
 constexpr std::size_t sniffed_lines = 20;
 constexpr double longest_without_voltage_s = 1;
 
@@ -60,7 +60,8 @@ class FrameLog {
       by_samples_ = options.map.empty();
     }
     dbc_name_ = own_ ? own_dbc_name : options.dbc;
-    dbc_ = own_ ? own_signals() : read_dbc(options.dbc);
+    dbc_ = own_ ? own_signals() : signals_of(options.dbc);
+    if (mapped.empty()) mapped = shipped_map_of(options.dbc);
     for (const std::string& text : mapped) signals_.push_back(mapped_signal(text, dbc_, dbc_name_, options));
     if (index_of(Quantity::current) == signals_.size())
       throw BadInput("--map", 1, "no signal for current_a, expected --map current_a=SIGNAL with a signal of the DBC");

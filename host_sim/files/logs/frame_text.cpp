@@ -12,14 +12,6 @@ namespace bms::files {
 
 namespace {
 
-constexpr std::uint32_t most_short_id = 0x7FF, most_long_id = 0x1FFF'FFFF;
-
-bool number_in(std::string_view text, int base, std::uint32_t& value) {
-  if (text.starts_with("0x") || text.starts_with("0X")) text.remove_prefix(2);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
-  return error == std::errc() && end == text.data() + text.size() && !text.empty();
-}
-
 bool add_byte(std::string_view text, int base, TextFrame& frame) {
   std::uint32_t value = 0;
   if (frame.length == frame.data.size() || !number_in(text, base, value) || value > 255) return false;
@@ -38,6 +30,8 @@ bool is_direction(std::string_view word) {
          (word.starts_with("RX") || word.starts_with("TX") || word.starts_with("rx") || word.starts_with("tx"));
 }
 
+}  // namespace
+
 void split_words(std::string_view line, std::vector<std::string_view>& words) {
   words.clear();
   for (std::size_t k = 0; k < line.size();) {
@@ -48,7 +42,11 @@ void split_words(std::string_view line, std::vector<std::string_view>& words) {
   }
 }
 
-}  // namespace
+bool number_in(std::string_view text, int base, std::uint32_t& value) {
+  if (text.starts_with("0x") || text.starts_with("0X")) text.remove_prefix(2);
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value, base);
+  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+}
 
 bool FrameText::parse(std::string_view line, TextFrame& frame) {
   frame.length = 0;
@@ -56,6 +54,10 @@ bool FrameText::parse(std::string_view line, TextFrame& frame) {
   if (format_ == "gvret") return parse_gvret(line, frame);
   split_words(line, words_);
   if (words_.empty()) return false;
+  if (format_.empty() && line.starts_with("***BUSMASTER")) format_ = "busmaster";
+  if (format_.empty() && line.starts_with(";$FILEVERSION")) format_ = "trc";
+  if (format_ == "busmaster") return parse_busmaster(line, frame);
+  if (format_ == "trc") return parse_trc(line, frame);
   if (format_.empty()) {
     if (line.starts_with("Time Stamp,ID,")) {
       format_ = "gvret";
@@ -64,6 +66,9 @@ bool FrameText::parse(std::string_view line, TextFrame& frame) {
     const bool asc = (words_.size() >= 3 && words_[0] == "base") || (words_.size() >= 4 && words_[0] == "date");
     if (asc) {
       format_ = "asc";
+    } else if (words_[0].ends_with(')') && !words_[0].starts_with('(') && parse_trc(line, frame)) {
+      format_ = "trc";
+      return true;
     } else if (words_[0].starts_with('(') && parse_dump(frame)) {
       format_ = is_direction(words_[1]) ? "battery-emulator" : "candump";
       return true;

@@ -21,6 +21,8 @@ constexpr std::array formats = {
     LogFormat{"neware", "Neware",
               "|datapoint|record id|record index|record number|total time|realtime|time(h:min:s.ms)|absolute time|",
               true, false},
+    LogFormat{"leafspy", "LeafSpy", "|cp mv diff|max cp mv|gids|", true, false, {}, "mV"},
+    LogFormat{"scanmytesla", "Scan My Tesla", "|cell temp min|cell temp avg|cell temp mid|", true, false, "ms", "V"},
     LogFormat{"csv", "table", "", false, false},
 };
 
@@ -31,16 +33,16 @@ struct Names {
 constexpr std::array all_names = {
     Names{Quantity::time,
           "|test time|testtime|total time|elapsed time|realtime|absolute time|time|test|unix time|date time|datetime|"
-          "dpt time|timestamp|time stamp|date|epoch|zeit|t|runtime|run time|"},
+          "dpt time|timestamp|time stamp|date/time|date|epoch|zeit|t|runtime|run time|"},
     Names{Quantity::current,
-          "|current|i|<i>|amps|cur|curr|pack current|battery current|batt current|i batt|ibatt|ibat|i bat|strom|"},
+          "|current|i|<i>|amps|cur|curr|pack current|pack|battery current|batt current|i batt|ibatt|ibat|i bat|strom|"},
     Names{Quantity::voltage,
           "|voltage|volts|ecell|ewe|<ewe>|cell voltage|v|u|vol|battery voltage|batt voltage|u batt|v batt|vbat|ubat|"
           "potential|spannung|"},
     Names{Quantity::temperature,
           "|temperature|temp|cell temperature|temp 1|temperature 1|t1|temperature t1|surface temperature t1|"
           "surface temperature|aux temperature 1|aux temperature|temperatur|ambient temperature|"},
-    Names{Quantity::pack_voltage, "|pack voltage|total voltage|stack voltage|sum voltage|sumvoltage|bus voltage|"},
+    Names{Quantity::pack_voltage, "|pack voltage|pack|total voltage|stack voltage|sum voltage|sumvoltage|bus voltage|"},
     Names{Quantity::soc_ref, "|soc ref|"},
     Names{Quantity::current_ref, "|current ref|"},
     Names{Quantity::voltage_ref, "|voltage ref|"},
@@ -105,7 +107,7 @@ const LogFormat* log_format(std::string_view name) {
 std::string log_format_names() {
   std::string names;
   for (const LogFormat& format : formats) names += std::string(format.name) + ", ";
-  return names + "candump, battery-emulator, asc, gvret";
+  return names + "candump, battery-emulator, asc, gvret, trc, busmaster";
 }
 
 int rank_of(Quantity quantity, std::string_view base) {
@@ -120,7 +122,7 @@ int rank_of(Quantity quantity, std::string_view base) {
 
 std::size_t cell_number(Quantity quantity, std::string_view base) {
   constexpr std::array voltage = {"cell voltage ", "cell v ", "cell ", "vcell ", "vcell", "v cell ",
-                                  "ucell ",        "u cell ", "cell",  "v ",     "u "};
+                                  "ucell ",        "u cell ", "cell",  "v ",     "u ",    "cp"};
   constexpr std::array temperature = {"cell temperature ", "temperature ", "temp ", "t ", "tcell", "tcell "};
   if (quantity == Quantity::cell_voltage) {
     for (const char* prefix : voltage) {

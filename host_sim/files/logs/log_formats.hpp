@@ -15,8 +15,10 @@ struct LogFormat {
   std::string_view title;  ///< for the user
   /// Headings, normalised; a header with one of them is of this format. Separated by '|'.
   std::string_view marks;
-  bool base_units = false;    ///< A and V where a heading states no unit
-  bool state_column = false;  ///< the current has no sign; a state 'D' discharges
+  bool base_units = false;          ///< A and V where a heading states no unit
+  bool state_column = false;        ///< the current has no sign; a state 'D' discharges
+  std::string_view time_unit = {};  ///< of times whose heading states none
+  std::string_view cell_unit = {};  ///< of cells whose heading states none
 };
 
 /// In the order in which they are tried. The last is any table whose headings state their units.

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/logs/column_options.hpp"
 #include "files/logs/log_formats.hpp"
 #include "files/logs/missing_reading.hpp"
 #include "files/logs/number.hpp"
@@ -54,6 +55,31 @@ std::optional<Target> target_of_entity(const std::string& entity) {
   }
 }
 
+/// One line of the console of ESPHome with a reading.
+struct ConsoleReading {
+  std::string_view time, entity, state, unit;
+};
+std::optional<ConsoleReading> console_reading(std::string_view line) {
+  const std::size_t open = line.find('['), close = line.find(']', open == std::string_view::npos ? 0 : open);
+  constexpr std::string_view between = "': Sending state ", before = "]: '";
+  const std::size_t name = line.find(before), state = line.find(between);
+  if (open == std::string_view::npos || close == std::string_view::npos || name == std::string_view::npos ||
+      state == std::string_view::npos || state < name + before.size())
+    return std::nullopt;
+  ConsoleReading reading{.time = line.substr(open + 1, close - open - 1),
+                         .entity = line.substr(name + before.size(), state - name - before.size()),
+                         .state = {},
+                         .unit = {}};
+  if (!clock_s(reading.time)) return std::nullopt;
+  std::string_view rest = line.substr(state + between.size());
+  rest = rest.substr(0, rest.find(" with "));
+  reading.state = rest.substr(0, rest.find(' '));
+  if (reading.state.size() < rest.size()) reading.unit = trimmed(rest.substr(reading.state.size()));
+  return reading;
+}
+
+constexpr double day_length_s = 86'400;
+
 class LongTable {
  public:
   LongTable(TextLines& lines, const TableLayout& layout, const std::string& path, const ReadOptions& options)
@@ -69,6 +95,17 @@ class LongTable {
       if (fields.size() < needed)
         refuse(fmt::format("{} fields", fields.size()), fmt::format("{} as in the header", layout_.headings.size()));
       receive(fields);
+    }
+    return finish();
+  }
+
+  measurement::Recording read_lines_of_console() {
+    std::string_view line;
+    while (lines_.next(line)) {
+      const auto reading = console_reading(line);
+      if (!reading) continue;
+      unit_ = reading->unit;
+      receive({reading->entity, reading->state, reading->time});
     }
     return finish();
   }
@@ -96,11 +133,30 @@ class LongTable {
     series.readings.push_back({time_of(fields[at_.time]), series.scale(value)});
   }
 
-  double time_of(std::string_view field) const {
+  double time_of(std::string_view field) {
     if (const auto date = date_s(field, options_.day_first)) return *date;
+    if (const auto clock = clock_s(field)) {
+      if (*clock + day_s_ < last_clock_s_ - day_length_s / 2) day_s_ += day_length_s;
+      last_clock_s_ = *clock + day_s_;
+      return last_clock_s_;
+    }
     const auto s = number(field);
     if (!s || std::isnan(*s)) refuse(in_quotes(field) + " is not a time", "a date or seconds");
     return *s;
+  }
+
+  /// What the user says about the unit, or the line.
+  std::optional<Scale> scale_of_series(const Target& target) const {
+    const auto stated = stated_unit(options_.unit, target);
+    if (!stated && unit_.empty()) return Scale{};
+    const std::string unit = stated ? *stated : std::string(unit_);
+    const auto scale = scale_of(target.quantity, unit);
+    if (!scale && stated) {
+      throw BadInput("--unit", 1,
+                     fmt::format("{} is not a unit of {}, expected one of: {}", in_quotes(unit), name_of(target),
+                                 units_of(target.quantity)));
+    }
+    return scale;
   }
 
   /// The series that this entity fills; nothing if it is not used.
@@ -117,18 +173,9 @@ class LongTable {
       refuse(fmt::format("{} and {} are both {}", in_quotes(s.entity), in_quotes(entity), name_of(*target)),
              fmt::format("--map {}=ENTITY with one of them, and so on", name_of(*target)));
     }
-    Series series{.entity = entity, .target = *target, .scale = {}, .readings = {}};
-    for (const std::string& text : options_.unit) {
-      if (!text.starts_with(name_of(*target) + "=")) continue;
-      const std::string unit = text.substr(text.find('=') + 1);
-      const auto scale = scale_of(target->quantity, unit);
-      if (!scale)
-        throw BadInput("--unit", 1,
-                       in_quotes(unit) + " is not a unit of " + name_of(*target) +
-                           ", expected one of: " + units_of(target->quantity));
-      series.scale = *scale;
-    }
-    series_.push_back(std::move(series));
+    const auto scale = scale_of_series(*target);
+    if (!scale) return std::nullopt;  // "max voltage cell" without a unit is a number of a cell
+    series_.push_back({.entity = entity, .target = *target, .scale = *scale, .readings = {}});
     return series_.size() - 1;
   }
 
@@ -187,16 +234,16 @@ class LongTable {
     std::vector<double> time_s = rows;
     for (double& t : time_s) t -= rows.front();
     r.time_s = std::move(time_s);
-    r.read_as = fmt::format("long table, a reading a row; time_s from {}", in_quotes(layout_.headings[at_.time]));
+    r.read_as = unit_.empty() ? "long table, a reading a row; time_s from " + in_quotes(layout_.headings[at_.time])
+                              : std::string("console of ESPHome");
     std::size_t named = 0;
     for (Series& s : series_) {
       put_column(r, s.target, column_of(s, rows));
       if (named++ < most_named) r.read_as += fmt::format("; {} from {}", name_of(s.target), in_quotes(s.entity));
     }
     if (named > most_named) r.read_as += fmt::format("; and {} more", named - most_named);
-    r.read_as +=
-        "; in A, V and degrees C unless --unit states another; readings within 1 s are one row, and are held "
-        "until the next";
+    r.read_as += unit_.empty() ? "; in A, V and degrees C unless --unit states another" : "; in the units of its lines";
+    r.read_as += "; readings within 1 s are one row, and are held until the next";
     const bool inverted = options_.sign == CurrentSign::discharge_positive;
     for (double& a : r.current_a.edit()) a = inverted ? -a : a;
     r.read_as += inverted ? "; a discharge is positive, inverted" : "; > 0 charges";
@@ -228,9 +275,37 @@ class LongTable {
   std::map<std::string, std::optional<std::size_t>> index_;
   std::vector<Series> series_;
   std::size_t missing_ = 0;
+  std::string_view unit_;  ///< that the line states
+  double day_s_ = 0, last_clock_s_ = 0;
 };
 
+constexpr std::size_t sniffed_lines = 200;  ///< a device says much before its first reading
+
+TableLayout console_layout() {
+  TableLayout layout;
+  layout.headings = {"entity", "state", "the console"};
+  layout.long_table = LongColumns{0, 1, 2};
+  return layout;
+}
+
 }  // namespace
+
+bool is_console(const std::string& path) {
+  TextLines lines(path);
+  std::string_view line;
+  for (std::size_t k = 0; k < sniffed_lines && lines.next(line); ++k) {
+    if (console_reading(line)) return true;
+  }
+  return false;
+}
+
+measurement::Recording read_console(const std::string& path, const ReadOptions& options, std::size_t& bytes) {
+  TextLines lines(path);
+  const TableLayout layout = console_layout();
+  measurement::Recording recording = LongTable(lines, layout, path, options).read_lines_of_console();
+  bytes = lines.bytes();
+  return recording;
+}
 
 measurement::Recording read_long_table(TextLines& lines, const TableLayout& layout, const std::string& path,
                                        const ReadOptions& options) {

@@ -37,6 +37,25 @@ void drop_absent(std::vector<measurement::Column>& columns) {
   while (!columns.empty() && has_no_reading(columns.back())) columns.pop_back();
 }
 
+/// A voltage next to those of the cells that is their sum is the pack's.
+void move_pack_voltage(Recording& r) {
+  if (r.cell_voltage_v.size() < 2 || r.voltage_v.empty()) return;
+  const measurement::Column mean = mean_of(r.cell_voltage_v);
+  std::vector<double> ratio;
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    if (mean[k] > 0 && !std::isnan(r.voltage_v[k])) ratio.push_back(r.voltage_v[k] / mean[k]);
+  }
+  if (ratio.empty()) return;
+  std::nth_element(ratio.begin(), ratio.begin() + static_cast<std::ptrdiff_t>(ratio.size() / 2), ratio.end());
+  const double cells = ratio[ratio.size() / 2];
+  if (std::abs(cells - static_cast<double>(r.cell_voltage_v.size())) > 0.5) return;
+  if (r.pack_voltage_v.empty()) r.pack_voltage_v = r.voltage_v;
+  r.voltage_v = measurement::Column{};
+  r.warnings.push_back({"pack_voltage",
+                        "voltage_v is the sum of the cells: it is used as pack_voltage_v, and voltage_v "
+                        "is the mean of the cells"});
+}
+
 }  // namespace
 
 measurement::Column& column_of(Recording& r, const Target& target) {
@@ -82,6 +101,7 @@ void complete_pack(Recording& r, const ReadOptions& options) {
   drop_absent(r.cell_temperature_c);
   if (!r.pack_voltage_v.empty() && has_no_reading(r.pack_voltage_v)) r.pack_voltage_v = measurement::Column{};
   if (!r.cell_temperature_c.empty() && r.temperature_c.empty()) r.temperature_c = mean_of(r.cell_temperature_c);
+  move_pack_voltage(r);
   if (!r.voltage_v.empty()) return;
   if (!r.cell_voltage_v.empty()) {
     r.voltage_v = mean_of(r.cell_voltage_v);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/logs/column_options.hpp"
 #include "files/logs/time_text.hpp"
 #include "files/text_file.hpp"
 
@@ -20,19 +21,6 @@ char separator_of(std::string_view line, const ReadOptions& options) {
   if (!options.separator.empty()) return options.separator.front();
   if (line.find('\t') != std::string_view::npos) return '\t';
   return line.find(';') != std::string_view::npos ? ';' : ',';
-}
-
-/// "current_a=I_batt" as target and the rest.
-std::pair<Target, std::string> assignment(const std::string& text, const std::string& option) {
-  const std::size_t equals = text.find('=');
-  const auto target = target_of(trimmed(std::string_view(text).substr(0, equals)));
-  if (equals == std::string::npos || !target) {
-    throw BadInput(option, 1,
-                   in_quotes(text) +
-                       " names no column of a recording, expected NAME=... with time_s, current_a, "
-                       "voltage_v, temperature_c, soc_ref, pack_voltage_v, v_1, t_1 or another of them");
-  }
-  return {*target, std::string(trimmed(std::string_view(text).substr(equals + 1)))};
 }
 
 /// Finds the header and assigns columns to quantities.
@@ -89,7 +77,7 @@ class HeaderFinder {
   [[noreturn]] void refuse(std::string_view line, std::size_t number) const {
     TableLayout layout = headings_of(line);
     for (const auto& [target, column] : maps_) {
-      if (heading_named(layout, column)) continue;
+      if (heading_named(layout, column) || !group_of(column, layout.headings).empty()) continue;
       throw BadInput(path_, number,
                      fmt::format("no column {} in {}, expected the column that --map {} names", in_quotes(column),
                                  in_quotes(line), name_of(target)));
@@ -131,7 +119,7 @@ class HeaderFinder {
                                    ? "states no unit"
                                    : fmt::format("has the unit {}, which is not known", in_quotes(heading.unit));
     const std::string expected =
-        cell ? fmt::format("--map {}=COLUMN for each cell, which reads it in V", name_of(target))
+        cell ? "--unit v_*=UNIT for all cells with one of: " + std::string(units_of(quantity))
              : fmt::format("--unit {}=UNIT with one of: {}", name_of(target), units_of(quantity));
     throw BadInput(path_, number, fmt::format("column {} {}, expected {}", in_quotes(text), states, expected));
   }
@@ -178,6 +166,12 @@ class HeaderFinder {
   /// Returns false if the line lacks a column that the user named.
   bool take_maps(TableLayout& layout) const {
     for (const auto& [target, column] : maps_) {
+      if (target.number == every_number && column.find('*') != std::string::npos) {
+        const auto group = group_of(column, layout.headings);
+        for (const auto& [number, index] : group) add(layout, index, {target.quantity, number});
+        if (group.empty()) return false;
+        continue;
+      }
       const auto at = heading_named(layout, column);
       if (!at) return false;
       add(layout, *at, target);
@@ -239,7 +233,8 @@ class HeaderFinder {
     }
     layout.own = nothing_mapped;
     layout.format = log_format("csv");
-    return complete(layout) && (options_.format.empty() || options_.format == "csv");
+    const bool app = format_of(layout)->cell_unit.size() > 0;  // its cells need no name from the user
+    return complete(layout) && !app && (options_.format.empty() || options_.format == "csv");
   }
 
   static bool marked(const LogFormat& format, const TableLayout& layout) {
@@ -255,6 +250,7 @@ class HeaderFinder {
       if (target.quantity == quantity) return true;
     }
     if (scale_of(quantity, heading.unit)) return true;
+    if (quantity == Quantity::time && !layout.format->time_unit.empty()) return true;
     if (quantity == Quantity::time) return heading.unit.empty() || is_clock_unit(heading.unit);
     if (quantity == Quantity::state) return true;
     return heading.unit.empty() &&
@@ -283,12 +279,18 @@ class HeaderFinder {
       for (std::size_t k = 0; k < layout.headings.size(); ++k) {
         const Heading heading = heading_of(layout.headings[k]);
         const Target target{quantity, cell_number(quantity, heading.base)};
-        if (target.number > 0 && !uses(layout, k) && !has(layout, target) && scale_of(quantity, heading.unit))
-          add(layout, k, target);
+        const bool unit = scale_of(quantity, heading.unit) || unit_without_heading(layout, target);
+        if (target.number > 0 && !uses(layout, k) && !has(layout, target) && unit) add(layout, k, target);
       }
     }
     if (layout.count(Quantity::cell_voltage) == 0)
       std::erase_if(layout.columns, [](const auto& c) { return c.target.quantity == Quantity::cell_temperature; });
+  }
+
+  /// True if the user or the format says in which unit the readings of a cell are whose heading does not.
+  bool unit_without_heading(const TableLayout& layout, const Target& target) const {
+    const bool format = target.quantity == Quantity::cell_voltage && !layout.format->cell_unit.empty();
+    return format || stated_unit(options_.unit, target).has_value();
   }
 
   /// The time within a step, of a table that also has the number of the step.
@@ -314,10 +316,17 @@ class HeaderFinder {
 
   std::optional<TableLayout> finished(TableLayout layout, std::size_t number) const {
     refuse_same_names(layout, number);
+    for (SourceColumn& column : layout.columns) {
+      const Quantity q = column.target.quantity;
+      const std::string_view unit = q == Quantity::time ? layout.format->time_unit : layout.format->cell_unit;
+      if (!column.unit.empty() || unit.empty() || (q != Quantity::time && q != Quantity::cell_voltage)) continue;
+      column.unit = unit;
+      column.scale = scale_of(q, unit).value_or(Scale{});
+    }
     for (const auto& [target, unit] : units_) {
       const auto scale = scale_of(target.quantity, unit);
       for (SourceColumn& column : layout.columns) {
-        if (column.target != target) continue;
+        if (!holds_for(target, column.target)) continue;
         column.unit = unit;
         column.scale = scale.value_or(Scale{});
         column.clock = !scale;

@@ -12,6 +12,8 @@
 #include "files/logs/missing_reading.hpp"
 #include "files/logs/number.hpp"
 #include "files/logs/recording_columns.hpp"
+#include "files/logs/row_groups.hpp"
+#include "files/logs/row_selection.hpp"
 #include "files/logs/row_times.hpp"
 #include "files/logs/table_layout.hpp"
 #include "measurement/recording_checks.hpp"
@@ -46,6 +48,7 @@ class TableReader {
   Recording read(VoltageColumn voltage) {
     layout_ = find_header(lines_, recording_.path, voltage == VoltageColumn::required, options_);
     if (layout_.long_table) return read_long_table(lines_, layout_, recording_.path, options_);
+    selection_ = RowSelection(options_, layout_.headings, recording_.path, std::max<std::size_t>(lines_.number(), 1));
     assign_columns();
     bool first = true;
     while (next_line()) {
@@ -114,7 +117,8 @@ class TableReader {
                   .dated = layout_.day.has_value(),
                   .by_step = layout_.step.has_value(),
                   .day_first = options_.day_first});
-    for (const auto& index : {layout_.day, layout_.step}) last_used_ = std::max(last_used_, index.value_or(0));
+    for (const auto& index : {layout_.day, layout_.step, selection_.last_column()})
+      last_used_ = std::max(last_used_, index.value_or(0));
   }
 
   /// What bms simulate writes in addition to soc_ref, and no command needs.
@@ -211,6 +215,8 @@ class TableReader {
     if (k == layout_.day && !times_.set_day(field))
       refuse(fmt::format("{} in column '{}' is not a date", in_quotes(field), layout_.headings[k]), "a date");
     if (k == layout_.step) times_.set_step(field);
+    if (!selection_.take(k, field))
+      refuse(fmt::format("{} in column '{}' is not a number", in_quotes(field), layout_.headings[k]), "a number");
     if (column.into != nullptr)
       column.into->push_back(column.source->target.quantity == Quantity::time ? time(field, column)
                                                                               : value(field, column));
@@ -237,6 +243,7 @@ class TableReader {
     }
     if (std::abs(t.back() - t.front()) > longest_s)
       refuse(fmt::format("time_s = {:g}", t.back()), "a recording of less than ten years");
+    if (!selection_.keeps()) return drop_row();
     if (t.size() < 2 || t.back() != t[t.size() - 2] || !repeats_the_row_above()) return;
     times_.note_repeated(lines_.number());
     drop_row();
@@ -344,6 +351,8 @@ class TableReader {
     }
     if (!layout_.own || layout_.decimal_comma || layout_.separator == '\t' || !lines_.encoding().empty())
       r.read_as = text_of(layout_, options_, lines_.encoding());
+    r.read_as += selection_.text();
+    join_row_groups(r);
     complete_pack(r, options_);
   }
 
@@ -358,6 +367,7 @@ class TableReader {
   std::size_t last_kept_ = 0;  ///< column that is only kept
   std::size_t words_ = 0, overflows_ = 0, first_overflow_line_ = 0;
   RowTimes times_;
+  RowSelection selection_;
   Recording recording_;
 };
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/logs/column_options.hpp"
 #include "files/logs/number.hpp"
 #include "files/logs/table_layout.hpp"
 #include "files/logs/time_text.hpp"
@@ -101,9 +102,7 @@ bool settle(TableLayout& layout, std::string_view line, const std::string& path,
   const SourceColumn* time = layout.find(Quantity::time);
   if (units && scale_of(Quantity::time, field(*time))) {
     for (SourceColumn& column : layout.columns) {
-      const bool stated = std::any_of(options.unit.begin(), options.unit.end(), [&](const std::string& text) {
-        return text.starts_with(name_of(column.target) + "=");
-      });
+      const bool stated = stated_unit(options.unit, column.target).has_value();
       if (stated || field(column).empty() || column.target.quantity == Quantity::state) continue;
       column.unit = field(column);
       column.scale = *scale_of(column.target.quantity, column.unit);

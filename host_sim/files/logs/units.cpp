@@ -24,7 +24,6 @@ constexpr std::array named_targets = {
     NamedTarget{"pack_voltage_v", Quantity::pack_voltage},
     NamedTarget{"state", Quantity::state},
 };
-constexpr std::size_t most_cells = 1'000;
 
 struct UnitName {
   std::string_view names;  ///< separated and surrounded by '|'
@@ -59,6 +58,7 @@ constexpr std::array temperature_units = {
 constexpr std::array fraction_units = {
     UnitName{"|1|fraction|", {}},
     UnitName{"|%|percent|pct|", {1, 100, 0}},
+    UnitName{"|ppm|", {1, 1e6, 0}},
 };
 
 template <std::size_t Count>
@@ -149,7 +149,7 @@ const char* units_of(Quantity quantity) {
     case Quantity::cell_temperature:
       return "C, K, F";
     case Quantity::soc_ref:
-      return "1, %";
+      return "1, %, ppm";
     default:
       return "V, mV, cV, uV, kV";
   }

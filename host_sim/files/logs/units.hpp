@@ -22,6 +22,8 @@ enum class Quantity {
   state,             ///< of a tester: "D" discharges, where the current has no sign
 };
 
+inline constexpr std::size_t most_cells = 1'000;
+
 /// A column of a recording: a quantity, and for v_K and t_K the number from 1.
 struct Target {
   Quantity quantity = Quantity::time;
