@@ -129,7 +129,9 @@ class SocEstimator {
 
   static constexpr std::uint32_t unmeasured = time_gap | current_missing | current_implausible;
   static constexpr std::uint32_t voltage_was_used = 1U << 31;  ///< of check_voltage(); not a Flag
-  static constexpr std::uint32_t current_varies = 1U << 30;    ///< perhaps, between two rows; not a Flag
+  /// The current perhaps varied between two rows. Not a Flag; bit 9 is set after it is cleared, and with it the mask of
+  /// these bits is one immediate operand.
+  static constexpr std::uint32_t current_varies = soc_ambiguous;
 
   /// Sensors give the mean over a second or less. What flowed in the rest of a longer row is not known.
   static constexpr std::uint64_t row_hides_us = 2'000'000;
