@@ -50,6 +50,7 @@ struct Strength {
   std::size_t mechanism = 0;
   double size = 1;          ///< that is common, in its unit
   std::size_t columns = 1;  ///< of its mechanism: they share its prior
+  bool shared = true;       ///< false: 0 but for a change
 };
 
 struct Change {
@@ -82,10 +83,24 @@ NoiseModel none_but_white() {
   return noise;
 }
 
+constexpr double contact_ohm = 0.01;
+
+/// A contact of contact_ohm during all of a recording.
+Columns contact_column(const LikelihoodModel& likelihood) {
+  Columns column = Columns::Zero(static_cast<Index>(likelihood.samples()), 1);
+  Index row = 0;
+  for (const PreparedRecording& r : likelihood.records()) {
+    for (const double a : r.current_a) column(row++, 0) = std::isfinite(a) ? contact_ohm * a : 0;
+  }
+  return column;
+}
+
 void add_strengths(const LikelihoodModel& likelihood, const bms::diagnosis::HypothesisFit& fit, RawColumns& raw) {
   std::vector<std::size_t> over;
   for (std::size_t m = 0; m < bms::model::mechanism_count; ++m) {
-    if (!not_testable(likelihood, fit.hypothesis, m)) over.push_back(m);
+    // a contact that changes after the healthy recording is a change, not a shared strength
+    const bool shared = bms::diagnosis::knowledge_of(m).signature == bms::diagnosis::Signature::derivatives;
+    if (shared && !not_testable(likelihood, fit.hypothesis, m)) over.push_back(m);
   }
   const bms::diagnosis::SignatureSet set = signatures(likelihood, fit, over);
   std::vector<Columns> columns;
@@ -94,10 +109,13 @@ void add_strengths(const LikelihoodModel& likelihood, const bms::diagnosis::Hypo
     for (std::size_t k = 0; k < p.parameters.size(); ++k) {
       const double size = common_size(p.setting.index, p.parameters[k], likelihood.cell().capacity_ah);
       columns.push_back(set.blocks[p.block].col(p.first + static_cast<Index>(k)) * (size * likelihood.noise().white_v));
-      raw.of.push_back({p.setting.index, size, 1});
+      raw.of.push_back({p.setting.index, size, 1, true});
       ++count[p.setting.index];
     }
   }
+  columns.push_back(contact_column(likelihood));
+  raw.of.push_back({bms::model::mechanism_index_of<bms::model::ContactStep>, contact_ohm, 1, false});
+  count[raw.of.back().mechanism] = 1;
   raw.strengths.resize(static_cast<Index>(likelihood.samples()), static_cast<Index>(columns.size()));
   for (std::size_t k = 0; k < columns.size(); ++k) {
     raw.strengths.col(static_cast<Index>(k)) = columns[k];
@@ -161,9 +179,11 @@ Joint joint_of(const LikelihoodModel& likelihood, const RawColumns& raw, const O
   Eigen::MatrixXd precision = j.gram;
   precision.topLeftCorner(j.bases, j.bases).diagonal().array() += 1;
   // prior covariance of one strength over the recordings: variance (1 1' + wander^2 I)
+  constexpr double fixed = 1e-9;  // variance of a strength that is 0
   const double w2 = o.wander * o.wander, n = static_cast<double>(records);
   for (Index k = 0; k < j.strengths; ++k) {
-    const double variance = o.strength * o.strength / static_cast<double>(raw.of[static_cast<std::size_t>(k)].columns);
+    const Strength& s = raw.of[static_cast<std::size_t>(k)];
+    const double variance = s.shared ? o.strength * o.strength / static_cast<double>(s.columns) : fixed;
     for (std::size_t a = 0; a < records; ++a) {
       for (std::size_t b = 0; b < records; ++b)
         precision(j.at(a) + k, j.at(b) + k) += ((a == b ? 1 : 0) - 1 / (n + w2)) / (variance * w2);
