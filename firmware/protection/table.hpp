@@ -352,9 +352,10 @@ constexpr Table protection_table(const PackDesign& d) {
            .why = "as for the charge limit"}),
       row({.fault = limit_not_obeyed,
            .raised = {.quantity = largest_excess_us, .sense = above, .threshold = in_micro(10.8), .delay_s = 0},
-           .released = {.threshold = in_micro(5.4), .after_s = 10, .recovery = automatic},
+           .released = {.threshold = in_micro(10.2), .after_s = 10, .recovery = automatic},
            .reaction = open_now,
-           .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0"}),
+           .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
+                  "released after two minutes, as its direction stays forbidden and opens again at once"}),
       row({.fault = supply_dip,
            .raised = {.quantity = supply_dips, .sense = above, .threshold = 0, .delay_s = 0},
            .released = {.threshold = 0, .after_s = 1, .recovery = automatic},

@@ -71,7 +71,7 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"charge limit exceeded", "ChargeLimitExceeded", '>', 3'600'000, 0, 1'800'000, 10'000, 'a', "forbid charge"},
     {"discharge limit exceeded", "DischargeLimitExceeded", '>', 3'600'000, 0, 1'800'000, 10'000, 'a',
      "forbid discharge"},
-    {"limit not obeyed", "LimitNotObeyed", '>', 10'800'000, 0, 5'400'000, 10'000, 'a', "open now"},
+    {"limit not obeyed", "LimitNotObeyed", '>', 10'800'000, 0, 10'200'000, 10'000, 'a', "open now"},
     {"supply dip", "SupplyDip", '>', 0, 0, 0, 1'000, 'a', "open now"},
 };
 
