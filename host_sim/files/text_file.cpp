@@ -79,7 +79,7 @@ class NewFile {
 };
 
 /// A symbolic link is kept: the file that it points to is replaced.
-std::filesystem::path target_of(const std::filesystem::path& wanted) {
+std::filesystem::path link_target_of(const std::filesystem::path& wanted) {
   std::error_code error;
   if (!std::filesystem::is_symlink(wanted, error)) return wanted;
   std::filesystem::path target = std::filesystem::weakly_canonical(wanted, error);
@@ -146,7 +146,7 @@ void write_file(const std::filesystem::path& wanted, const std::function<void(co
     return;
   }
   constexpr mode_t usual_mode = 0666;  // the umask applies
-  NewFile file(target_of(wanted), usual_mode);
+  NewFile file(link_target_of(wanted), usual_mode);
   if (std::filesystem::is_regular_file(status)) file.set_mode(static_cast<mode_t>(status.permissions()));
   produce([&](std::string_view piece) { file.write(piece); });
   file.rename();

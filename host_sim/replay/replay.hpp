@@ -12,6 +12,7 @@
 #include "files/cell_file.hpp"
 #include "files/text_file.hpp"
 #include "measurement/recording.hpp"
+#include "measurement/soc_column.hpp"
 
 namespace bms::replay {
 
@@ -125,6 +126,11 @@ struct VoltageFigures {
       open_loop_fit_percent;  ///< nothing: no measured voltage
 };
 
+/// The cell's true capacity, from the log (host_sim/replay/capacity_estimate.hpp).
+struct CapacityEstimate {
+  double value_ah = 0, std_ah = 0;
+};
+
 struct ReplayResult {
   measurement::Recording recording;
   files::CellFile cell;
@@ -138,10 +144,13 @@ struct ReplayResult {
   std::vector<double> open_loop_v;
   SocFigures soc;
   VoltageFigures voltage;
-  std::optional<std::string> verified_against;  ///< board with the same bits
-  std::optional<std::string> difference;        ///< or the first difference, in words
-  std::size_t run = 0, runs = 0;                ///< of a CAN log: which run of the firmware, and their number
-  std::vector<std::string> doubts;              ///< why the estimates are not reliable (host_sim/replay/judgement.hpp)
+  std::optional<std::string> verified_against;       ///< board with the same bits
+  std::optional<std::string> difference;             ///< or the first difference, in words
+  std::size_t run = 0, runs = 0;                     ///< of a CAN log: which run of the firmware, and their number
+  std::optional<measurement::SocColumn> soc_column;  ///< nothing: the log has none, or a reference instrument's
+  std::optional<CapacityEstimate> capacity;          ///< nothing: not determined by the log
+  std::vector<std::string> reasons;                  ///< sentences for the flags of the estimator
+  std::vector<std::string> doubts;  ///< why the estimates are not reliable (host_sim/replay/judgement.hpp)
 };
 
 /// Fills soc, voltage and open_loop_v from the track and the recording. The open loop starts by model/start.hpp.

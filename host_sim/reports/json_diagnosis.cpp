@@ -240,6 +240,15 @@ Json experiment_of(const diagnosis::NextExperiment& next, const std::string& the
           {"expected_gain", number(next.gain)}};
 }
 
+/// The SOC column of the first recording that has one of its own; null without one.
+Json soc_column_of_first(const workflow::DiagnoseResult& r) {
+  for (const workflow::RecordingComparison& of : r.recordings) {
+    if (of.recording.soc_ref.empty() || !of.recording.current_ref_a.empty()) continue;
+    return soc_column_of(measurement::judge_soc_column(of.recording, r.cell.parameters.capacity_ah));
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 std::string json_of(const workflow::DiagnoseResult& r) {
@@ -295,8 +304,8 @@ std::string json_of(const workflow::DiagnoseResult& r) {
   json["decision"] = {{"base_cost", number(d.base_cost)},     {"best_cost", number(d.best_cost)},
                       {"remaining", number(d.remaining)},     {"adequacy", number(d.adequacy)},
                       {"fast_excess", number(d.fast_excess)}, {"far_out", number(d.far_out)}};
-  json["out"] = r.out;
-  json["wall_s"] = r.wall_s;
+  json["soc_column"] = soc_column_of_first(r);
+  json.update({{"out", r.out}, {"wall_s", r.wall_s}});
   json["read_as"] = formats_of(r.recordings);
   json["notes"] = warnings_of(r.notes);
   json["warnings"] = warnings_of(r.warnings);

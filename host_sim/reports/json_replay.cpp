@@ -25,6 +25,10 @@ std::string json_of(const replay::ReplayResult& r, const std::string& trace_sha2
                  {"within_2_sigma", optional(r.soc.within_2_sigma)},
                  {"current_offset_a", optional(r.soc.current_offset_a)},
                  {"current_offset_sigma_a", optional(r.soc.current_offset_sigma_a)}};
+  json["soc_column"] = soc_column_of(r.soc_column);
+  json["capacity"] =
+      r.capacity ? Json({{"value_ah", r.capacity->value_ah}, {"std_ah", r.capacity->std_ah}}) : Json(nullptr);
+  json["reasons"] = r.reasons;
   json["reliable"] = r.doubts.empty();
   json["doubts"] = r.doubts;
   if (r.runs > 0) {

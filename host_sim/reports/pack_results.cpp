@@ -200,6 +200,9 @@ std::string json_of(const workflow::PackResult& r) {
                   {"not_visible", std::move(not_visible)},
                   {"reference_cells", std::move(reference)},
                   {"noise_floor_v", number(d.noise_v)},
+                  {"soc_column", r.recording.soc_ref.empty() ? Json(nullptr)
+                                                             : soc_column_of(measurement::judge_soc_column(
+                                                                   r.recording, r.cell.parameters.capacity_ah))},
                   {"wall_s", r.wall_s},
                   {"warnings", warnings_of(r.warnings)}});
 }

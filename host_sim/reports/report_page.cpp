@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 
 #include "files/text_file.hpp"
+#include "replay/capacity_estimate.hpp"
 #include "reports/embedded_files.hpp"
 
 namespace bms::reports {
@@ -106,6 +107,10 @@ std::string data(const replay::ReplayResult& r) {
                {"warnings", json::array()},
                {"figures", figures(r)}};
   for (const measurement::Warning& w : rec.warnings) page["warnings"].push_back(w.text);
+  if (r.soc_column) {
+    for (const measurement::SocEvent& event : r.soc_column->events)
+      page["marks"].push_back({(event.time_s - rec.time_s.front()) / 3'600, measurement::name_of(event.fault)});
+  }
   json& columns = page["columns"];
   const auto add = [&](const char* name, int decimals, const Value& value) {
     columns[name] = column(rows, decimals, value);
@@ -152,6 +157,13 @@ std::string statement(const replay::ReplayResult& r) {
                       r.recording.duration_s() / 3600, 100 * r.soc.final, 100 * r.soc.final_sigma);
   if (!r.track.rows.empty() && (r.track.rows.back().flags & estimator::soc_ambiguous) != 0)
     text += " More than one state of charge still fits the voltages.";
+  const double first_s = r.recording.time_s.empty() ? 0 : r.recording.time_s.front();
+  if (r.soc_column && !r.soc_column->is_count)
+    text += " " + measurement::sentence_of(
+                      *r.soc_column, first_s,
+                      replay::capacity_differs(r) ? r.capacity->value_ah : r.cell.parameters.capacity_ah);
+  constexpr std::size_t most_reasons = 3;
+  for (std::size_t k = 0; k < std::min(most_reasons, r.reasons.size()); ++k) text += " " + r.reasons[k];
   if (r.soc.rmse) {
     text += fmt::format(
         " Its error against the reference was {:.2f} % RMS, {:.2f} % at most; the reference is within two sigma for "

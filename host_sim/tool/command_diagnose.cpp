@@ -80,8 +80,17 @@ std::string comparison_text(const workflow::DiagnoseResult& r) {
   return text;
 }
 
+/// What the log's own state of charge is, if it is not a count; empty otherwise.
+std::string soc_column_line(const std::vector<measurement::Warning>& warnings) {
+  for (const measurement::Warning& w : warnings) {
+    if (w.id == "soc_column") return w.text + "\n";
+  }
+  return {};
+}
+
 std::string summary(const workflow::DiagnoseResult& r) {
   std::string text = fmt::format("{}: {}\n", name_of(r.diagnosis.verdict), r.diagnosis.statement);
+  text += soc_column_line(r.warnings);
   if (r.named()) {
     for (const diagnosis::Finding& f : r.diagnosis.findings) text += finding_text(r.diagnosis, f);
   }
@@ -115,6 +124,7 @@ std::string pack_summary(const workflow::PackResult& r) {
   }
   if (text.back() != '\n') text += '\n';
   if (!r.diagnosis.findings.empty() && !r.diagnosis.unexplained.empty()) text += r.diagnosis.statement + '\n';
+  text += soc_column_line(r.warnings);
   return text + "All cells together: " + r.shared + "\n" + dp::limits_text(r.diagnosis);
 }
 

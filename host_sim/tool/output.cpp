@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "files/bad_input.hpp"
+#include "files/finite_text.hpp"
 #include "files/text_file.hpp"
 #include "tool/progress.hpp"
 
@@ -65,8 +66,16 @@ void write_output(const std::string& file, const std::string& text) {
 }
 
 void write_output(const std::string& file, const std::function<void(const files::Sink&)>& produce) {
-  if (file != "-") return files::write_file(file, produce);
+  if (file != "-") {
+    return files::write_file(file, [&](const files::Sink& sink) {
+      produce([&](std::string_view piece) {
+        files::require_finite(piece);
+        sink(piece);
+      });
+    });
+  }
   produce([](std::string_view piece) {
+    files::require_finite(piece);
     if (std::fwrite(piece.data(), 1, piece.size(), stdout) != piece.size()) refuse_standard_output();
   });
   if (std::fflush(stdout) != 0) refuse_standard_output();
@@ -75,6 +84,7 @@ void write_output(const std::string& file, const std::function<void(const files:
 void print_summary(const Output& output, const std::string& text) {
   if (output.quiet || output.uses_standard_output()) return;
   clear_progress();
+  files::require_finite(text);
   std::printf("%s\n", files::printable(text, true).c_str());
   check_standard_output();
 }

@@ -16,6 +16,7 @@
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
+#include "measurement/soc_column_text.hpp"
 #include "workflow/diagnosis_comparison.hpp"
 #include "workflow/next_steps.hpp"
 
@@ -64,6 +65,10 @@ RecordingComparison read(const std::string& path, const files::ReadOptions& read
   measurement::Recording r = read_for_diagnosis(path, reading, input.cell);
   measurement::compare_with_cell(r, input.cell.parameters);
   for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
+  if (r.current_ref_a.empty()) {  // otherwise the state of charge is that of a reference instrument
+    const std::string text = measurement::soc_column_text(r, input.cell.parameters.capacity_ah);
+    if (!text.empty()) input.warnings.push_back({"soc_column", path + ": " + text});
+  }
   const RecordingStart found = recording_start(r, input.cell, given);
   if (!found.origin.empty()) input.notes.push_back({"initial_soc", path + ": " + found.origin});
   if (!found.contradiction.empty())

@@ -14,6 +14,7 @@
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
+#include "measurement/soc_column_text.hpp"
 #include "measurement/statistics.hpp"
 #include "replay/replay.hpp"
 #include "workflow/diagnose_recordings.hpp"
@@ -177,6 +178,8 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
   r.cell = cell;
   r.recording = std::move(recording);
   r.warnings = r.recording.warnings;
+  const std::string text = measurement::soc_column_text(r.recording, cell.parameters.capacity_ah);
+  if (!text.empty()) r.warnings.push_back({"soc_column", text});
   const std::optional<dp::PackFinding> reversed = turn_current(r.recording, cell);
   r.pack = pack_of(r.recording, cell, options.initial_soc);
   dp::PackOptions of_cells;

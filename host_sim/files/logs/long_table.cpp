@@ -78,7 +78,7 @@ std::optional<ConsoleReading> console_reading(std::string_view line) {
   return reading;
 }
 
-constexpr double day_length_s = 86'400;
+constexpr double one_day_s = 86'400;
 
 class LongTable {
  public:
@@ -136,7 +136,7 @@ class LongTable {
   double time_of(std::string_view field) {
     if (const auto date = date_s(field, options_.day_first)) return *date;
     if (const auto clock = clock_s(field)) {
-      if (*clock + day_s_ < last_clock_s_ - day_length_s / 2) day_s_ += day_length_s;
+      if (*clock + day_s_ < last_clock_s_ - one_day_s / 2) day_s_ += one_day_s;
       last_clock_s_ = *clock + day_s_;
       return last_clock_s_;
     }

@@ -42,8 +42,24 @@
     soc_labels.push('reference, %');
     soc_series.push(k => c.soc_ref[k] === null ? [null, null, null] : Array(3).fill(100 * c.soc_ref[k]));
   }
+  // where the log's own state of charge differs from a count of its current: a dashed line with the kind
+  const marks = (context, area, graph) => {
+    context.save();
+    context.strokeStyle = context.fillStyle = colour('reference');
+    context.setLineDash([4, 3]);
+    for (const [hour, kind] of report.marks || []) {
+      const x = graph.toDomXCoord(hour);
+      if (x < area.x || x > area.x + area.w) continue;
+      context.beginPath();
+      context.moveTo(x, area.y);
+      context.lineTo(x, area.y + area.h);
+      context.stroke();
+      context.fillText(kind, x + 3, area.y + 10);
+    }
+    context.restore();
+  };
   const charts = [
-    chart('soc', soc_labels, rows(soc_series), {customBars: true, axes: in_percent}),
+    chart('soc', soc_labels, rows(soc_series), {customBars: true, axes: in_percent, underlayCallback: marks}),
     chart(
         'voltage', ['predicted one step ahead, V', 'open loop, V', 'measured, V'],
         rows([at(c.predicted_v), at(c.open_loop_v), at(c.voltage_v)])),

@@ -1,0 +1,227 @@
+#include "replay/capacity_estimate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "model/cell.hpp"
+#include "model/one_rc.hpp"
+#include "replay/simulation.hpp"
+
+namespace bms::replay {
+
+namespace {
+
+constexpr double table_v = 0.010;         ///< hysteresis and the table's own error
+constexpr double resistance_share = 0.3;  ///< of the drop under current, which age and cold change
+constexpr double stretch_soc = 0.01, stretch_s = 900;
+constexpr double least_ratio = 0.5, most_ratio = 1.3;
+constexpr int tried_ratios = 161, tried_starts = 241;
+constexpr std::size_t most_stretches = 400;
+constexpr std::size_t ocv_points = 1'101;
+constexpr double soc_low = -0.05, soc_high = 1.05;
+constexpr double known_to = 0.06;    ///< relative standard deviation
+constexpr double worst_fit = 3;      ///< chi2 for each stretch
+constexpr double gain_share = 0.01;  ///< of the current sensor: the capacity is only as good as the charge
+constexpr double differs_sigmas = 3, differs_by = 0.05;
+
+/// A part of the log: the charge counted until its middle, and the open-circuit voltage that was seen there.
+struct Stretch {
+  double charge_ah = 0, ocv_v = 0, sigma_v = 0;
+};
+
+class Stretches {
+ public:
+  explicit Stretches(const ReplayResult& r)
+      : r_(r), cell_(model::prepare<double, model::max_intervals>(r.cell.parameters)) {}
+
+  std::vector<Stretch> all() {
+    const measurement::Recording& rec = r_.recording;
+    double charge_ah = 0, from_ah = 0, from_s = rec.time_s.front(), current_a = 0;
+    for (std::size_t k = 0; k < rec.rows(); ++k) {
+      const double hours = k == 0 ? 0 : (rec.time_s[k] - rec.time_s[k - 1]) / 3'600;
+      if (!std::isnan(rec.current_a[k])) current_a = rec.current_a[k];
+      charge_ah += current_a * hours;
+      const bool over = std::abs(charge_ah - from_ah) > stretch_soc * r_.cell.parameters.capacity_ah ||
+                        rec.time_s[k] - from_s > stretch_s;
+      if (over) {
+        end();
+        from_ah = charge_ah;
+        from_s = rec.time_s[k];
+      }
+      add(k, charge_ah, current_a);
+    }
+    end();
+    return std::move(list_);
+  }
+
+ private:
+  void add(std::size_t k, double charge_ah, double current_a) {
+    const EstimateRow e = r_.track.rows[k];
+    constexpr std::uint32_t unusable =
+        estimator::voltage_missing | estimator::voltage_implausible | estimator::voltage_stuck;
+    if ((e.flags & unusable) != 0 || std::isnan(r_.recording.voltage_v[k])) return;
+    const auto at = model::look_up(cell_, e.soc, interval_);
+    const double drop_v = model::OneRc<double>::voltage({}, at, {current_a, 0}) -
+                          model::OneRc<double>::voltage({}, at, {0, 0}) + e.v_rc_v;
+    sum_.charge_ah += charge_ah;
+    sum_.ocv_v += r_.recording.voltage_v[k] - drop_v;
+    sum_.sigma_v += std::abs(drop_v);
+    ++count_;
+  }
+  void end() {
+    if (count_ == 0) return;
+    const double n = count_;
+    const double tolerance_v = std::max(table_v, r_.cell.parameters.tolerance.ocv_v);
+    list_.push_back({sum_.charge_ah / n, sum_.ocv_v / n, std::hypot(tolerance_v, resistance_share * sum_.sigma_v / n)});
+    sum_ = {};
+    count_ = 0;
+  }
+
+  const ReplayResult& r_;
+  HostCell<double> cell_;
+  std::uint8_t interval_ = 0;
+  Stretch sum_;
+  int count_ = 0;
+  std::vector<Stretch> list_;
+};
+
+/// The OCV of the cell file, from its clamped range on with a steep end: no cell is emptier than empty.
+class Ocv {
+ public:
+  explicit Ocv(const files::CellFile& cell) {
+    const auto prepared = model::prepare<double, model::max_intervals>(cell.parameters);
+    std::uint8_t interval = 0;
+    for (std::size_t k = 0; k < table_.size(); ++k) {
+      const double soc = soc_low + (soc_high - soc_low) * static_cast<double>(k) / (ocv_points - 1.0);
+      const double inside = std::clamp(soc, 0.0, 1.0);
+      constexpr double steep_v = 20;  // for each unit of SOC
+      table_[k] = model::OneRc<double>::voltage({}, model::look_up(prepared, inside, interval), {0, 0}) +
+                  steep_v * (soc - inside);
+    }
+  }
+  double operator()(double soc) const {
+    const double at = (std::clamp(soc, -1.0, 2.0) - soc_low) / (soc_high - soc_low) * (ocv_points - 1.0);
+    const auto k = static_cast<std::size_t>(std::clamp(at, 0.0, ocv_points - 2.0));
+    return table_[k] + (at - static_cast<double>(k)) * (table_[k + 1] - table_[k]);
+  }
+
+ private:
+  std::array<double, ocv_points> table_{};
+};
+
+/// Every n-th, so that a log of a year takes no longer.
+std::vector<Stretch> thinned(const std::vector<Stretch>& all) {
+  std::vector<Stretch> list;
+  const std::size_t every = all.size() / most_stretches + 1;
+  for (std::size_t k = 0; k < all.size(); k += every) list.push_back(all[k]);
+  return list;
+}
+
+double chi2_of(const std::vector<Stretch>& list, const Ocv& ocv, double capacity_ah, double soc0) {
+  constexpr double far = 3;  // sigmas from where on a stretch counts linearly: a single odd one does not decide
+  double chi2 = 0;
+  for (const Stretch& s : list) {
+    const double z = std::abs(ocv(soc0 + s.charge_ah / capacity_ah) - s.ocv_v) / s.sigma_v;
+    chi2 += z < far ? z * z : far * (2 * z - far);
+  }
+  return chi2;
+}
+
+std::size_t count(const Estimates& rows, std::uint32_t flag, std::size_t& first) {
+  std::size_t found = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if ((rows.flags(k) & flag) == 0) continue;
+    if (found++ == 0) first = k;
+  }
+  return found;
+}
+
+/// What contradicts most likely.
+std::string cause_of(const ReplayResult& r) {
+  if (capacity_differs(r)) return "the capacity of the cell file";
+  const auto& offset = r.soc.current_offset_a;
+  if (offset && std::abs(*offset) > 2 * *r.soc.current_offset_sigma_a) return "an offset of the current sensor";
+  for (const measurement::Warning& w : r.recording.warnings) {
+    if (w.id == "charge_exceeds_capacity") return "the capacity of the cell file, or an offset of the current sensor";
+  }
+  if (r.prior) return "the initial state of charge that was given, or the cell file";
+  return r.capacity ? "an offset of the current sensor, or the cell file" : "the capacity or another cell file";
+}
+
+}  // namespace
+
+bool capacity_differs(const ReplayResult& r) {
+  if (!r.capacity) return false;
+  const double by = std::abs(r.capacity->value_ah - r.cell.parameters.capacity_ah);
+  return by > differs_sigmas * r.capacity->std_ah && by > differs_by * r.cell.parameters.capacity_ah;
+}
+
+std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
+  const std::vector<Stretch> list = thinned(Stretches(r).all());
+  if (list.size() < 3) return std::nullopt;
+  const Ocv ocv(r.cell);
+  const double file_ah = r.cell.parameters.capacity_ah;
+  std::vector<std::pair<double, double>> chi2;  // capacity, -2 ln of its probability
+  double best = INFINITY;
+  for (int c = 0; c < tried_ratios; ++c) {
+    const double ratio = least_ratio * std::pow(most_ratio / least_ratio, c / (tried_ratios - 1.0));
+    std::array<double, tried_starts> of_start{};
+    double lowest = INFINITY, sum = 0;
+    for (int s = 0; s < tried_starts; ++s) {
+      const double soc0 = s / (tried_starts - 1.0);
+      of_start[static_cast<std::size_t>(s)] = chi2_of(list, ocv, ratio * file_ah, soc0);
+      lowest = std::min(lowest, of_start[static_cast<std::size_t>(s)]);
+    }
+    for (const double of : of_start) sum += std::exp((lowest - of) / 2);
+    chi2.emplace_back(ratio * file_ah, lowest - 2 * std::log(sum));
+    best = std::min(best, lowest);
+  }
+  if (best > worst_fit * static_cast<double>(list.size())) return std::nullopt;
+  double least = INFINITY, weight = 0, mean = 0, square = 0;
+  for (const auto& [ah, of] : chi2) least = std::min(least, of);
+  for (const auto& [ah, of] : chi2) {
+    const double w = std::exp((least - of) / 2);
+    weight += w;
+    mean += w * ah;
+    square += w * ah * ah;
+  }
+  mean /= weight;
+  const double spread = std::sqrt(std::max(0.0, square / weight - mean * mean));
+  const double sigma = std::hypot(spread, gain_share * mean);
+  const bool at_bound = mean - 2 * spread < least_ratio * file_ah || mean + 2 * spread > most_ratio * file_ah;
+  if (at_bound || sigma > known_to * mean) return std::nullopt;
+  return CapacityEstimate{mean, sigma};
+}
+
+std::vector<std::string> reasons_of(const ReplayResult& r) {
+  constexpr std::array texts = {
+      std::pair{estimator::soc_contradicted, "the voltages contradict the counted charge"},
+      std::pair{estimator::voltage_rejected, "a voltage is far from every one that the cell file explains"},
+      std::pair{estimator::voltage_missing, "a voltage is missing"},
+      std::pair{estimator::voltage_stuck, "the voltage does not move while the current does"},
+      std::pair{estimator::current_missing, "a current is missing"},
+      std::pair{estimator::time_gap, "time is missing: the charge of a gap is uncertain"},
+      std::pair{estimator::current_beyond_limits, "the current is beyond the range of the cell file"}};
+  std::vector<std::string> reasons;
+  for (const auto& [flag, text] : texts) {
+    std::size_t first = 0;
+    const std::size_t rows = count(r.track.rows, flag, first);
+    if (rows == 0) continue;
+    std::string reason = fmt::format("From {:.0f} s on {} ({} samples)",
+                                     r.recording.time_s[first] - r.recording.time_s.front(), text, rows);
+    if (flag == estimator::soc_contradicted) reason += "; likely cause: " + cause_of(r);
+    reasons.push_back(reason + ".");
+  }
+  if (capacity_differs(r)) {
+    reasons.push_back(
+        fmt::format("The cell holds {:.3g} Ah (standard deviation {:.2g} Ah), not the {:.3g} Ah of its file.",
+                    r.capacity->value_ah, r.capacity->std_ah, r.cell.parameters.capacity_ah));
+  }
+  return reasons;
+}
+
+}  // namespace bms::replay

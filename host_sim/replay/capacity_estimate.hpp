@@ -1,0 +1,29 @@
+// The cell's true capacity from one log, without a full cycle.
+//
+// Each stretch of the log gives an open-circuit voltage, V - R0 I - V_RC, and the charge counted so far. The capacity
+// is what makes the state of charge of all of them agree with the cell file's OCV, wherever the log began:
+//
+//   chi2(C, soc0) = sum over stretches of ((ocv(soc0 + q / C) - u) / sigma)^2,  summed over soc0, normalised over C
+//
+// sigma of a stretch: hysteresis and the table's tolerance, and a third of the drop under current. A flat OCV shows
+// nothing of C, and then there is no answer.
+#pragma once
+
+#include <optional>
+
+#include "replay/replay.hpp"
+
+namespace bms::replay {
+
+/// Nothing if the log does not determine the capacity to 6 %, or if no capacity fits. Needs result.track and
+/// result.prior.
+std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& result);
+
+/// Returns true if the estimate is another capacity than that of the cell file: by three sigma and 5 %.
+bool capacity_differs(const ReplayResult& result);
+
+/// A sentence for each kind of flag that a user can act on, with how often, the first time and the likely cause; and
+/// one if the estimated capacity is not that of the cell file.
+std::vector<std::string> reasons_of(const ReplayResult& result);
+
+}  // namespace bms::replay
