@@ -63,7 +63,7 @@ Log make_log(unsigned seed, const SocFault* fault) {
   const double sign = random() % 2 == 0 ? 1 : -1, jump = sign * uniform(0.04, 0.25),
                ratio = 1 + sign * uniform(0.15, 0.35);
   const double drift_per_s = sign * uniform(0.06, 0.15) / (hours * 3'600 - at_s), held_s = uniform(2'400, 4'800);
-  double held = -1;
+  double stuck = -1;
   std::vector<double> t, a, v, s;
   for (std::size_t k = 0; k < rows; ++k) {
     const double time_s = static_cast<double>(k) * period_s;
@@ -92,8 +92,8 @@ Log make_log(unsigned seed, const SocFault* fault) {
     if (fault != nullptr && *fault == SocFault::table) shown = table_soc(voltage);
     shown = std::round(shown / step) * step;
     if (fault != nullptr && *fault == SocFault::stuck && time_s >= at_s && time_s < at_s + held_s) {
-      if (held < 0) held = shown;
-      shown = held;
+      if (stuck < 0) stuck = shown;
+      shown = stuck;
     }
     t.push_back(time_s);
     a.push_back(current);

@@ -64,7 +64,7 @@ TEST(CapacityEstimate, IsWithinItsSigmaWhereTheLogReachesBothKnees) {
   EXPECT_GE(said, 6);
 }
 
-TEST(CapacityEstimate, IsNotGivenWhereTheLogDoesNotTell) {
+TEST(CapacityEstimate, IsNotGivenWhereTheLogHasTooLittle) {
   const double file_ah = files::read_cell("a123_26650").parameters.capacity_ah;
   for (unsigned k = 0; k < 4; ++k) {
     const ReplayResult r = log_of(file_ah * (0.75 + 0.1 * k), 0.62, 0.45, 5, k);
