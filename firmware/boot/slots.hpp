@@ -49,7 +49,7 @@ struct Start {
 /// trial, because a running image resets only by watchdog, fault or its own wish.
 Start choose(SlotFlash& flash, const Battery& battery, bool power_on);
 
-/// Called by the image that runs, once it has confirmed itself (confirmation.hpp). Raises the counter to its security
+/// Called by the image that runs, once it has confirmed itself. Raises the counter to its security
 /// version. May be called again.
 bool confirm(SlotFlash& flash, std::uint8_t slot, std::uint32_t security_version);
 

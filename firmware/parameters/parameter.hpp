@@ -11,15 +11,15 @@
 //   7  charge_temperature_min 0.1 degC     0 degC to 10 degC                                   yes
 //   8  voltage_delay         ms            500 to 10,000: no row of a voltage waits longer     yes
 //   9  temperature_delay     ms            1,000 to 5,000: no row of a temperature does        yes
-//   10 capacity              0.1 Ah        half of the cell file's to the cell file's          yes
+//   10 capacity              0.1 Ah        half of the cell file's to the cell file's          yes; not the estimator's
 //   11 shunt                 nohm          +-5 % of the board's                                of the wiring
 //   12 precharge_time        ms            two samples to 4 s: resistor times DC link          of the wiring
 //   13 closing_difference    mV            a quarter of the board's to the board's             yes
 //   14 can_bit_rate          kbit/s        125, 250, 500, 1,000                                of the bus
 //   15 can_base              identifier    0x100 to 0x7C0, a multiple of 0x40                  of the bus
 //   16 can_stop              identifier    1 to 0x7FF                                          of the bus
-//   17 canopen_node          node          1 to 127                                            of the bus
-//   18 canopen_charger       node          1 to 127                                            of the bus
+//   17 canopen_node          node          the build's: only shown                             of the bus
+//   18 canopen_charger       node          the build's: only shown                             of the bus
 //   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor
 //
 // The initial values are those of the build. `tightened_plan.hpp` says what the limits do, and proves at compile time
@@ -99,7 +99,7 @@ constexpr Ranges ranges_of(const protection::PackDesign& d, const BuildDefaults&
     return Range{up(least - rounding), up(most - rounding), up(least - rounding)};
   };
   const double closing_mv = 1e3 * d.closing_current_max_a * d.closing_loop_ohm;
-  const auto node = [](std::int32_t initial) { return Range{1, 127, initial}; };
+  const auto fixed = [](std::int32_t initial) { return Range{initial, initial, initial}; };
   const std::int32_t sample_ms = down(1e3 * d.sample_period_s + 0.5);
   return {tightened_down(1e3 * l.voltage_max_v, 1e3 * (l.voltage_max_v - 0.2 * span_v)),
           tightened_up(1e3 * l.voltage_min_v, 1e3 * (l.voltage_min_v + 0.4 * span_v)),
@@ -117,8 +117,8 @@ constexpr Ranges ranges_of(const protection::PackDesign& d, const BuildDefaults&
           Range{125, 1'000, build.bit_rate_kbit_s},
           Range{0x100, 0x7C0, build.can_base},
           Range{1, 0x7FF, build.can_stop},
-          node(build.canopen_node),
-          node(build.canopen_charger),
+          fixed(build.canopen_node),
+          fixed(build.canopen_charger),
           Range{0, build.inputs_fitted, build.inputs_fitted}};
 }
 

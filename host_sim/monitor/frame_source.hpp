@@ -4,9 +4,12 @@
 //                           dropped frames
 //   slcan:/dev/ttyACM0      a serial adapter or pseudo-terminal, hal/slcan/codec.hpp: set to 500 kbit/s (S6), opened
 //                           (O), closed at the end (C); 921,600 baud if the port has a baud rate. The time of a frame
-//                           is the time when it was read.
+//                           is the time when it was read. slcan:/dev/ttyACM0,rate=250: 125, 250, 500 or 1,000 kbit/s.
 //   file:DUMP.log           candump -L, plain or compressed by gzip; file:- is standard input. Times are those of the
 //                           log.
+//
+// ,base=0x400 and ,stop=0x050 after any of them: the battery's messages and Stop have other identifiers on this bus
+// than in firmware/can/greybox_bms.dbc (hal/identifiers.hpp). Frames are read and sent by those of the DBC file.
 //
 // Memory use is bounded for any input. Malformed lines are counted.
 #pragma once
@@ -59,7 +62,7 @@ std::int64_t clock_us();
 
 // Each throws SourceError.
 std::unique_ptr<FrameSource> open_socketcan(const std::string& interface);
-std::unique_ptr<FrameSource> open_slcan(const std::string& device);
+std::unique_ptr<FrameSource> open_slcan(const std::string& device, unsigned kbit_s = 500);
 std::unique_ptr<FrameSource> open_dump(const std::string& path);
 
 }  // namespace bms::monitor

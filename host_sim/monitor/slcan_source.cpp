@@ -7,6 +7,7 @@
 #include <array>
 #include <cerrno>
 #include <system_error>
+#include <utility>
 
 #include "monitor/frame_source.hpp"
 #include "monitor/slcan_stream.hpp"
@@ -17,7 +18,7 @@ namespace {
 
 class Slcan : public FrameSource {
  public:
-  explicit Slcan(const std::string& device) : fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
+  Slcan(const std::string& device, char speed) : fd_(open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC)) {
     if (fd_ < 0)
       throw SourceError(device, 1,
                         "cannot be opened, expected a serial port (" + std::generic_category().message(errno) + ")");
@@ -31,7 +32,7 @@ class Slcan : public FrameSource {
     cfsetspeed(&raw, B921600);
     tcsetattr(fd_, TCSANOW, &raw);
     tcflush(fd_, TCIOFLUSH);
-    send("\rC\rS6\rO\r");  // the first \r ends a partial line of the adapter
+    send(std::string("\rC\rS") + speed + "\rO\r");  // the first \r ends a partial line of the adapter
   }
   ~Slcan() override {
     send("C\r");
@@ -98,6 +99,12 @@ class Slcan : public FrameSource {
 
 }  // namespace
 
-std::unique_ptr<FrameSource> open_slcan(const std::string& device) { return std::make_unique<Slcan>(device); }
+std::unique_ptr<FrameSource> open_slcan(const std::string& device, unsigned kbit_s) {
+  const std::pair<unsigned, char> speeds[] = {{125, '4'}, {250, '5'}, {500, '6'}, {1'000, '8'}};
+  for (const auto& [rate, speed] : speeds) {
+    if (rate == kbit_s) return std::make_unique<Slcan>(device, speed);
+  }
+  throw SourceError(device, 1, "has a bit rate that is unknown, expected rate=125, 250, 500 or 1000");
+}
 
 }  // namespace bms::monitor

@@ -232,7 +232,9 @@ class ParametersCommand final : public Command {
       if (k < now.size() && now[k] != wanted[k])
         fmt::print("{}: {} -> {} {}\n", p.name, text_of(p, now[k]), text_of(p, wanted[k]), p.unit);
     }
-    fmt::print("bit rate, identifiers and nodes are used from the next start on\n");
+    fmt::print(
+        "bit rate and identifiers are used from the next start on; then the source of all commands is, for example, "
+        "can0,base=0x400,stop=0x050\n");
     return 0;
   }
 

@@ -239,7 +239,7 @@ TEST_F(ParametersTest, EveryValueBeyondItsRangeIsRefusedAndDiscardsTheSet) {
   EXPECT_EQ(refused, 79);
   // each possible, but not together: two messages with one identifier
   for (const auto& [p, value] : {std::pair{Parameter::can_stop, 0x1A0}, std::pair{Parameter::can_base, 0x300},
-                                 std::pair{Parameter::canopen_charger, 1}, std::pair{Parameter::can_base, 0x700}}) {
+                                 std::pair{Parameter::can_base, 0x700}}) {
     begin(board);
     EXPECT_EQ(set(board, p, value), Answer::result_done);
     EXPECT_EQ(apply(board, with({{p, value}})), Answer::result_refused) << value;

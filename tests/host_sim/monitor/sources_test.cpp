@@ -131,7 +131,9 @@ TEST_F(Dump, EndlessBytesWithoutALineAreRejected) {
 
 TEST(Source, ThatDoesNotExistIsRejected) {
   for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch",
-                           "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have"}) {
+                           "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have",
+                           "slcan:/dev/null,rate=300", "file:/dev/zero,base=", "file:/dev/zero,base=0x800",
+                           "file:/dev/zero,stop=1F", "file:/dev/zero,rate=250", "file:/dev/zero,node=3"}) {
     EXPECT_THROW(open_source(name), SourceError) << name;
   }
 }
@@ -199,6 +201,26 @@ TEST_F(Slcan, OpensTheChannelReadsFramesAndClosesIt) {
     EXPECT_FALSE(source->ended());
   }
   EXPECT_EQ(adapter.received(2), "C\r");
+}
+
+TEST_F(Slcan, ReadsAndSendsMessagesThatHaveOtherIdentifiersOnTheBus) {
+  const auto source = open_source(adapter.source() + ",rate=250,base=0x400,stop=80");
+  EXPECT_EQ(adapter.received(8), "\rC\rS5\rO\r");
+  adapter.send("t4022AABB\rt1822CCDD\rt0501EE\rt0A01FF\rT000001821AA\rt7FF0\r");
+  std::vector<BusFrame> frames(8);
+  std::size_t n = 0;
+  for (int tries = 0; tries < 5 && n < 4; ++tries) n += source->read(std::span(frames).subspan(n), patience_ms);
+  ASSERT_EQ(n, 4U) << "0x182 and 0x0A0 are of another node";
+  EXPECT_EQ(frames[0].id, 0x182U);
+  EXPECT_EQ(frames[0].data[0], 0xAA);
+  EXPECT_EQ(frames[1].id, 0x0A0U);
+  EXPECT_EQ(frames[1].data[0], 0xEE);
+  EXPECT_EQ(frames[2].id, 0x182U) << "with 29 bits, as it is";
+  EXPECT_EQ(frames[2].kind, FrameKind::extended);
+  EXPECT_EQ(frames[3].id, 0x7FFU);
+  EXPECT_TRUE(source->send({0x1B0, 1, {0x12}}));
+  EXPECT_TRUE(source->send({0x0A0, 1, {0x34}}));
+  EXPECT_EQ(adapter.received(16), "t430112\rt050134\r");
 }
 
 TEST_F(Slcan, EndsWhenTheAdapterIsUnplugged) {
