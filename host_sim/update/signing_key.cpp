@@ -74,7 +74,7 @@ SigningKey::SigningKey(const std::string& file_or_uri) {
   Pkey key = load(file_or_uri, OSSL_STORE_INFO_PKEY);
   if (!key) throw files::BadInput(file_or_uri, 1, "has no private key, expected a PEM file or an address of PKCS#11");
   const boot::PublicKey point = point_of(*key, file_or_uri);
-  key_ = std::make_unique<Key>(std::move(key), point);
+  key_ = std::make_unique<Key>(Key{std::move(key), point});
 }
 
 SigningKey::~SigningKey() = default;
