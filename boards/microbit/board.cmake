@@ -12,7 +12,7 @@ set(BMS_MOST_CELLS 1)
 set(BMS_SAMPLE_PERIOD_S 1.0)
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
-set(BMS_BUDGET_FLASH 81920)
+set(BMS_BUDGET_FLASH 86016)  # rows of seconds and voltages outside the range took 1.5 KB; the chip has 256 KiB
 set(BMS_BUDGET_RAM 8192)
 set(BMS_BUDGET_STACK 4096)
 set(BMS_BUDGET_SAMPLE_MS 100)  # a tenth of its period; the first sample takes longest
