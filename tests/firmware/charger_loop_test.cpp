@@ -28,12 +28,12 @@ class Charger {
   virtual void receive(const can::Frame& frame, double now_s) = 0;
 
   /// Current into the pack: a regulator with the time constant of a power supply.
-  double current_a(double pack_v, bool connected, double now_s) {
+  double current_a(double terminals_v, bool connected, double now_s) {
     const double limit_a = ignores_limit ? rated_a : std::min(rated_a, wanted_a(now_s));
     const double target_v = own_target_v.value_or(wanted_v(now_s));
     if (!connected || limit_a <= 0 || target_v <= 0) return current_a_ = 0;
     constexpr double loop_ohm = 0.3;
-    current_a_ = std::clamp(current_a_ + 0.3 * (target_v - pack_v) / loop_ohm, 0.0, limit_a);
+    current_a_ = std::clamp(current_a_ + 0.3 * (target_v - terminals_v) / loop_ohm, 0.0, limit_a);
     return current_a_;
   }
   double output_a() const { return current_a_; }

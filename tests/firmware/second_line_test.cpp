@@ -200,7 +200,7 @@ TEST(SecondLineOfTheFrontEnd, FollowsTheTemperaturesOfTheCell) {
 /// With 0.1 mOhm the comparator of a pack of 420 A would open at less than three times its limit.
 TEST(SecondLineOfTheFrontEnd, APackForWhichAProtectionWouldBeTooNarrowOrOffDoesNotCompile) {
   EXPECT_FALSE(Chip(lfp(420), 420).wider_and_slower());
-  for (const std::uint16_t enabled : {0x9261, 0x9262, 0x9263, 0x9265, 0x9266, 0x9267, 0x9269, 0x926A, 0x926B}) {
+  for (const int enabled : {0x9261, 0x9262, 0x9263, 0x9265, 0x9266, 0x9267, 0x9269, 0x926A, 0x926B}) {
     auto settings = table9.settings;
     for (auto& s : settings) {
       if (s.address == enabled) s.value = 0;
