@@ -70,11 +70,12 @@ class SocMonitor {
     }
     const Variance mean_v2 = consistency_.overpotential_v2(),
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
-    reading_noise_v2_ =
-        Variance(Variance(cell.noise.voltage_v2 +
-                          arithmetic::product<Variance>(seen_v2(constants), constants.correlated_samples())) +
-                 Variance(load_.noise_v2(mean_v2, cell, constants) +
-                          arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
+    reading_noise_v2_ = Variance(
+        cell.noise.voltage_v2 + Variance(load_.noise_v2(mean_v2, cell, constants) +
+                                         arithmetic::product<Variance>(by_temperature_v2, constants.relaxing_noise())));
+    if (constants.extrapolated() > Fraction(0)) [[unlikely]]
+      reading_noise_v2_ = Variance(reading_noise_v2_ +
+                                   arithmetic::product<Variance>(seen_v2(constants), constants.correlated_samples()));
   }
 
   constexpr bool needs_check(const Soc& soc, const Voltage& innovation_v) const {

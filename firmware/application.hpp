@@ -311,7 +311,10 @@ class Application {
   [[gnu::noinline]] bool apply_calibration(const Requested::CalibrationChange& change) {
     if (protection_.decision().outputs.any_closed() || !persistence_.may_set()) return false;
     hal::SensorCalibration calibration = stored_calibration(persistence_, change);
-    if constexpr (has_parameters) calibration = with_shunt(calibration, Board::parameters());
+    if constexpr (has_parameters) {
+      calibration = with_shunt(calibration, Board::parameters());
+      if (!gain_proved(calibration)) return false;
+    }
     if (!hal::calibrate(calibration)) return false;
     store_setting(static_cast<std::uint16_t>(first_calibration_key + change.which),
                   static_cast<std::uint32_t>(change.value));
@@ -326,7 +329,7 @@ class Application {
         parameter_commands_.execute(command, protection_.decision().outputs.any_closed(), block, persistence_, may);
     if (block.revision() == before) return result;
     Board::apply_parameters();
-    hal::calibrate(with_shunt(stored_calibration(persistence_), block));
+    hal::calibrate(limited(with_shunt(stored_calibration(persistence_), block)));
     return result;
   }
 

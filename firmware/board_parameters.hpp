@@ -2,6 +2,9 @@
 // Another board has the empty base class, and its image nothing of all this.
 #pragma once
 
+#include <algorithm>
+#include <cstdint>
+
 #include "hal/calibration.hpp"
 #include "parameters/active_plan.hpp"
 #include "parameters/parameter_block.hpp"
@@ -29,7 +32,11 @@ const protection::ProtectionPlan& active_plan_or(const protection::ProtectionPla
     return of_build;
 }
 
+/// The gains for which the current rows and the front end's own are proved: a reading is at most 5 % low.
+inline constexpr std::int32_t most_gain_ppm = 50'000;
+
 /// Calibration with the shunt of this battery: its resistance, relative to the one that the board assumes, is a gain.
+/// May exceed most_gain_ppm together with the calibrated gain.
 inline hal::SensorCalibration with_shunt(hal::SensorCalibration calibration,
                                          const parameters::ParameterBlock& parameters) {
   using parameters::Parameter;
@@ -37,6 +44,14 @@ inline hal::SensorCalibration with_shunt(hal::SensorCalibration calibration,
                      nohm = at(parameters.active(), Parameter::shunt);
   calibration.current_gain_ppm =
       static_cast<std::int32_t>((1'000'000 + calibration.current_gain_ppm) * of_build / nohm - 1'000'000);
+  return calibration;
+}
+constexpr bool gain_proved(const hal::SensorCalibration& calibration) {
+  return calibration.current_gain_ppm >= -most_gain_ppm && calibration.current_gain_ppm <= most_gain_ppm;
+}
+/// Readings of a shunt that contradicts the calibrated gain: they are wrong by what is beyond the limit.
+constexpr hal::SensorCalibration limited(hal::SensorCalibration calibration) {
+  calibration.current_gain_ppm = std::clamp(calibration.current_gain_ppm, -most_gain_ppm, most_gain_ppm);
   return calibration;
 }
 

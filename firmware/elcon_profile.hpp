@@ -40,7 +40,9 @@ class ElconProfile {
     constexpr std::uint8_t failures = 0x07;
     repeated_ = present(now_us);
     healthy_ = (frame.data[4] & failures) == 0;
-    output_uv_ = (frame.data[0] << 8 | frame.data[1]) * 100'000;
+    // behind its diode or relay a charger that delivers nothing measures its own output
+    const bool delivers = (frame.data[2] | frame.data[3]) != 0;
+    output_uv_ = delivers ? (frame.data[0] << 8 | frame.data[1]) * 100'000 : measurement::no_reading;
     received_ = true;
     received_us_ = now_us;
   }

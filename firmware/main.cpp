@@ -19,7 +19,7 @@ bms::hal::SensorCalibration start_parameters(bms::storage::Persistence& persiste
   if constexpr (requires { Board::parameters(); }) {
     Board::parameters().start(persistence);
     Board::apply_parameters();
-    return bms::firmware::with_shunt(stored, Board::parameters());
+    return bms::firmware::limited(bms::firmware::with_shunt(stored, Board::parameters()));
   }
   return stored;
 }

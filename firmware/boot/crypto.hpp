@@ -33,7 +33,7 @@ inline Digest sha256(std::span<const std::uint8_t> bytes) {
   return all.finish();
 }
 
-/// Returns false for a point that is not on the curve as well. Stack and time: README.md.
+/// Returns false for a point that is not on the curve as well.
 bool signature_right(const PublicKey& key, const Digest& digest, const Signature& signature);
 
 /// A key is named by the first eight bytes of its SHA-256.

@@ -10,7 +10,7 @@ namespace bms::boot {
 
 namespace {
 
-/// Of the multiplication; the largest need is stated in README.md. A check that gets no memory refuses.
+/// Of the multiplication; a check that gets no memory refuses.
 constexpr std::size_t heap_bytes = 6 * 1024;
 
 struct Curve {

@@ -1,14 +1,12 @@
-// The battery's side of an update: a UDS server (ISO 14229-1) with the services of a download. Needs no hardware; the
-// loader uses it while no image runs, the application while it protects.
+// The battery's side of an update: a UDS server (ISO 14229-1) with the services of a download. Needs no hardware; meant
+// for the loader while no image runs, and for the application while it protects.
 //
 //   10 session            01 default, 02 programming; ends after 5 s without a request
-//   27 security access    01: challenge of 6 bytes; 02: operator (2), session_code (4)
-//   (firmware/authentication/codes.hpp);
-//                         a challenge of 0: no key, nothing to prove
-//   22 read               F1A0 board, F1A1 state (StateRecord), F1A4 last refusal (1)
-//   31 routine, 01 start  FF00 erase the target slot; 0203 resume: digest of the header (32), returns the bytes
-//   received;
-//                         FF01 check the slot and make it the next to start
+//   27 security access    01: challenge of 6 bytes; 02: operator (2), session_code (4) of
+//                         firmware/authentication/codes.hpp; a challenge of 0: no key, nothing to prove
+//   22 read               F1A0 board, F1A1 state, F1A4 last refusal (1)
+//   31 routine, 01 start  FF00 erase the target slot; 0203 resume: digest of the header (32), returns the
+//                         bytes received; FF01 check the slot and make it the next to start
 //   34 request download   00 44 address (4) size (4): the target slot from its begin on, or from where it stopped
 //   36 transfer data      sequence, at most 1,024 bytes
 //   37 transfer exit

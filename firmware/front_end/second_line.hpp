@@ -152,7 +152,7 @@ constexpr bool overcurrent_is_wider_and_slower(const SecondLine& chip, const pro
 /// lower a reading.
 constexpr bool sustained_is_wider_and_slower(const SecondLine& chip, const protection::Rules& rules,
                                              const protection::PackDesign& pack) {
-  constexpr double counts_from = 1.05, least_reading = 0.99, grace_s = 5, chain_s = 0.5;
+  constexpr double counts_from = 1.05, least_reading = 0.95, grace_s = 5, chain_s = 0.5;
   const double times = least_reading * chip.sustained_a / (counts_from * pack.limits.discharge_current_max_a);
   const double heat_s = 1e-6 * rule_of(rules, protection::Fault::discharge_overcurrent).threshold;
   return times > 1 && chip.sustained_s >= heat_s / (times * times - 1) + grace_s + chain_s;

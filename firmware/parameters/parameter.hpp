@@ -138,12 +138,13 @@ constexpr bool possible(Parameter p, std::int32_t value, const Ranges& ranges) {
   return true;
 }
 
-/// Returns true if no two messages of the battery have the same identifier. 0x300 to 0x33F are those of samples
-/// (hal/sample_frames.hpp); the others are those of a CANopen node (firmware/cia418_profile.hpp).
+/// Returns true if no two messages of the battery have the same identifier, and Stop wins the arbitration. 0x300 to
+/// 0x33F are those of samples (hal/sample_frames.hpp); the others are those of a CANopen node
+/// (firmware/cia418_profile.hpp).
 constexpr bool identifiers_are_unique(const Values& values) {
   const std::int32_t base = at(values, Parameter::can_base), stop = at(values, Parameter::can_stop),
                      node = at(values, Parameter::canopen_node), charger = at(values, Parameter::canopen_charger);
-  if (node == charger || base == 0x300) return false;
+  if (node == charger || base == 0x300 || stop >= base) return false;
   const auto own = [&](std::int32_t id) { return id >= base && id < base + base_step; };
   if (own(stop) || (stop >= 0x300 && stop < 0x340)) return false;
   const std::int32_t of_canopen[] = {0x580 + node,    0x600 + node,    0x700 + node,   0x700 + charger,

@@ -49,7 +49,8 @@ std::pair<std::vector<double>, double> joined(const Column& column, const Record
 }  // namespace
 
 void join_row_groups(Recording& r) {
-  if (r.current_a.size() != r.rows()) return;
+  if (r.current_a.size() != r.rows() || std::ranges::all_of(r.current_a, [](double a) { return std::isnan(a); }))
+    return;
   const std::vector<Column*> all = columns_of(r);
   const auto apart = [&](const Column& c) { return c.size() == r.rows() && is_apart(c, r.current_a); };
   const bool any = apart(r.voltage_v) || apart(r.pack_voltage_v) ||

@@ -36,6 +36,9 @@ std::string entry(const char* name, bool known, const std::string& value) {
   return fmt::format("\"{}\": {}", name, known ? value : "null");
 }
 
+/// The factor as it stands in the DBC file, which a float is not. More than 24 bits with a factor are raw in C++.
+double decimal(float factor) { return std::round(1e6 * static_cast<double>(factor)) / 1e6; }
+
 /// Sets the value of a signal and returns its entry of "values".
 std::string set(const char* name, float& value, const can::SignalLayout& s, Kind kind) {
   const double span = s.highest - s.lowest;
@@ -52,7 +55,9 @@ std::string set(const char* name, float& value, const can::SignalLayout& s, Kind
 std::string set(const char* name, std::int32_t& value, const can::SignalLayout& s, Kind) {
   const auto most = static_cast<std::int32_t>(can::mask(s.bits - 1));
   value = static_cast<std::int32_t>(chance());
-  return entry(name, true, fmt::format("{}", std::clamp(value, -most - 1, most)));
+  const double sent = std::clamp(value, -most - 1, most);
+  const bool known = !s.has_invalid || value != static_cast<std::int32_t>(s.invalid);
+  return entry(name, known, fmt::format("{}", sent * decimal(s.factor) + static_cast<double>(s.offset)));
 }
 std::string set(const char* name, std::uint32_t& value, const can::SignalLayout& s, Kind kind) {
   const auto most = s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
@@ -64,9 +69,8 @@ std::string set(const char* name, std::uint32_t& value, const can::SignalLayout&
     value = static_cast<std::uint32_t>(chance() % (std::uint64_t{most} + 1));
   const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
   if (s.bits <= 24) return entry(name, known, fmt::format("{}", std::min(value, most)));
-  // more than 24 bits with a factor: the value is raw in C++; the factor is a decimal number, which a float is not
-  const double factor = std::round(1e6 * static_cast<double>(s.factor)) / 1e6;
-  return entry(name, known, fmt::format("{}", static_cast<double>(value) * factor + static_cast<double>(s.offset)));
+  return entry(name, known,
+               fmt::format("{}", static_cast<double>(value) * decimal(s.factor) + static_cast<double>(s.offset)));
 }
 
 template <class Message>

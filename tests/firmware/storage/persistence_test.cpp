@@ -285,7 +285,7 @@ TEST_F(PersistenceTest, ARecordOfANewerFirmwareIsPreservedReportedAndNotRead) {
     storage::Log log;
     log.open();
     ASSERT_EQ(log.store({1, 3}, unknown), storage::StoreResult::stored);
-    ASSERT_EQ(log.store({9, 1}, unknown), storage::StoreResult::stored);
+    ASSERT_EQ(log.store({11, 1}, unknown), storage::StoreResult::stored);
   }
   boot(ResetCause::software);
   EXPECT_EQ(p.newer_records(), 2U);
@@ -298,7 +298,7 @@ TEST_F(PersistenceTest, ARecordOfANewerFirmwareIsPreservedReportedAndNotRead) {
   std::array<std::uint8_t, storage::max_payload_bytes> bytes;
   storage::Log log;
   log.open();
-  const auto found = log.load(9, 1, bytes);
+  const auto found = log.load(11, 1, bytes);
   ASSERT_TRUE(found);
   EXPECT_TRUE(std::ranges::equal(found->payload, unknown));
 }

@@ -180,7 +180,8 @@ TEST(Blocks, EndInTheStateOfSingleInstructionsBitForBit) {
 }
 
 /// The ways differ in the moment within a run in which a register is read, and in what they count. That can be a sample
-/// when the sequence of the contactors begins, and another one where it waits for two samples in a row.
+/// when the sequence of the contactors begins, and another one where it waits for two samples in a row; the frames of
+/// these samples are sent in one world only.
 TEST(Blocks, SwitchTheContactorsAsSingleInstructionsWithinTwoSamples) {
   TruckWorld by_blocks(pack_of(6).image, typical_setup(pack_of(6)));
   TruckWorld by_instructions(pack_of(6).image, typical_setup(pack_of(6)));
@@ -195,7 +196,7 @@ TEST(Blocks, SwitchTheContactorsAsSingleInstructionsWithinTwoSamples) {
     EXPECT_NEAR(one[k].at_s, other[k].at_s, 0.205) << k;
   }
   for (std::size_t id = 0; id < by_blocks.vehicle.frames.size(); ++id)
-    EXPECT_NEAR(by_blocks.vehicle.frames[id], by_instructions.vehicle.frames[id], 1) << id;
+    EXPECT_NEAR(by_blocks.vehicle.frames[id], by_instructions.vehicle.frames[id], 2) << id;
   EXPECT_EQ(by_blocks.vehicle.soc_percent(), by_instructions.vehicle.soc_percent());
 }
 
