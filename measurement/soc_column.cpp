@@ -35,12 +35,26 @@ double median(std::vector<double> list) {
   return *middle;
 }
 
+/// Without a current for longer than this, what was charged meanwhile is not known: a minute, or ten usual rows [s].
+double longest_gap_s(const Recording& r) {
+  std::vector<double> rows_s;
+  for (std::size_t k = 1; k < r.rows(); ++k) rows_s.push_back(r.time_s[k] - r.time_s[k - 1]);
+  return std::max(60.0, 10 * median(std::move(rows_s)));
+}
+
 std::vector<Value> values_of(const Recording& r, double capacity_ah) {
+  const double gap_s = longest_gap_s(r);
+  double without_s = 0;
+  bool lost = false;
   std::vector<Value> values;
   double charge = 0, unknown = 0, current_a = 0, voltage_v = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t k = 0; k < r.rows(); ++k) {
     const double hours = k == 0 ? 0 : (r.time_s[k] - r.time_s[k - 1]) / 3'600;
-    const double now_a = std::isnan(r.current_a[k]) ? current_a : r.current_a[k];
+    const bool known = !std::isnan(r.current_a[k]);
+    const double now_a = known ? r.current_a[k] : current_a;
+    without_s += 3'600 * hours;
+    lost = lost || without_s > gap_s;
+    if (known) without_s = 0;
     charge += (now_a + current_a) / 2 * hours / capacity_ah;
     unknown += std::abs(now_a - current_a) / 2 * hours / capacity_ah;
     current_a = now_a;
@@ -58,8 +72,10 @@ std::vector<Value> values_of(const Recording& r, double capacity_ah) {
       v.voltage_v = std::isnan(voltage_v) ? 0 : r.voltage_v[k] - voltage_v;
       voltage_v = r.voltage_v[k];
     }
+    if (lost) v.change = v.charge = v.unknown = v.voltage_v = 0;  // not judged
     values.push_back(v);
     charge = unknown = 0;
+    lost = false;
   }
   return values;
 }

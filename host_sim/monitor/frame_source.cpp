@@ -62,7 +62,9 @@ struct Settings {
     const auto [rest, error] =
         std::from_chars(name.data() + equals + (hexadecimal ? 3 : 1), end, value, hexadecimal ? 16 : 10);
     constexpr unsigned last_id = 0x7FF;
-    if (error != std::errc{} || rest != end || value > last_id)
+    using hal::Identifiers;
+    const bool takes_room = key == "base" && (value == 0 || value % Identifiers::block != 0);
+    if (error != std::errc{} || rest != end || value > last_id || takes_room)
       throw SourceError(name, 1, "has no number after " + key + "=, expected one such as 0x400");
     *place = value;
     name.resize(comma);

@@ -23,9 +23,10 @@ constexpr int tried_ratios = 161, tried_starts = 241;
 constexpr std::size_t most_stretches = 400;
 constexpr std::size_t ocv_points = 1'101;
 constexpr double soc_low = -0.05, soc_high = 1.05;
-constexpr double known_to = 0.06;    ///< relative standard deviation
-constexpr double worst_fit = 3;      ///< chi2 for each stretch
-constexpr double gain_share = 0.01;  ///< of the current sensor: the capacity is only as good as the charge
+constexpr double known_to = 0.06;         ///< relative standard deviation
+constexpr double worst_fit = 3;           ///< chi2 for each stretch
+constexpr double longest_unknown_s = 72;  ///< 2 % of a capacity at 1C
+constexpr double gain_share = 0.01;       ///< of the current sensor: the capacity is only as good as the charge
 constexpr double differs_sigmas = 3, differs_by = 0.05;
 
 /// A part of the log: the charge counted until its middle, and the open-circuit voltage that was seen there.
@@ -140,6 +141,16 @@ std::size_t count(const Estimates& rows, std::uint32_t flag, std::size_t& first)
   return found;
 }
 
+/// Time for which no current is known [s].
+double unknown_s(const ReplayResult& r) {
+  constexpr std::uint32_t unknown = estimator::time_gap | estimator::current_missing | estimator::current_implausible;
+  double sum_s = 0;
+  for (std::size_t k = 1; k < r.track.rows.size(); ++k) {
+    if ((r.track.rows.flags(k) & unknown) != 0) sum_s += r.recording.time_s[k] - r.recording.time_s[k - 1];
+  }
+  return sum_s;
+}
+
 /// What contradicts most likely.
 std::string cause_of(const ReplayResult& r) {
   if (capacity_differs(r)) return "the capacity of the cell file";
@@ -162,7 +173,7 @@ bool capacity_differs(const ReplayResult& r) {
 
 std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   const std::vector<Stretch> list = thinned(Stretches(r).all());
-  if (list.size() < 3) return std::nullopt;
+  if (list.size() < 3 || unknown_s(r) > longest_unknown_s) return std::nullopt;
   const Ocv ocv(r.cell);
   const double file_ah = r.cell.parameters.capacity_ah;
   std::vector<std::pair<double, double>> chi2;  // capacity, -2 ln of its probability
@@ -191,7 +202,11 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   }
   mean /= weight;
   const double spread = std::sqrt(std::max(0.0, square / weight - mean * mean));
-  const double sigma = std::hypot(spread, gain_share * mean);
+  // an offset of the current sensor that the cell file allows
+  const auto [lowest, highest] = std::ranges::minmax(list, {}, &Stretch::charge_ah);
+  const double counted_ah = highest.charge_ah - lowest.charge_ah,
+               drift_ah = r.cell.parameters.noise.current_offset_a * r.recording.duration_s() / 3'600;
+  const double sigma = std::hypot(spread, gain_share * mean, mean * drift_ah / std::max(1e-9, counted_ah));
   const bool at_bound = mean - 2 * spread < least_ratio * file_ah || mean + 2 * spread > most_ratio * file_ah;
   if (at_bound || sigma > known_to * mean) return std::nullopt;
   return CapacityEstimate{mean, sigma};

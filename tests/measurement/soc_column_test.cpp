@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <random>
 #include <string>
 
@@ -168,6 +169,25 @@ TEST(SocColumn, AColumnThatStaysFullWhileTheChargerHoldsTheVoltageIsSound) {
   log.recording.soc_ref = soc;
   log.recording.current_a = current;
   EXPECT_TRUE(judge_soc_column(log.recording, capacity_of(log)).is_count);
+}
+
+/// A logger that was off while the battery was charged, and one whose current was missing meanwhile.
+TEST(SocColumn, WhatWasChargedWithoutACurrentInTheLogIsNotBlamed) {
+  for (const bool missing : {false, true}) {
+    Log log = make_log(2'001, nullptr);
+    const std::size_t rows = log.recording.rows(), from = rows / 3, to = rows / 2;
+    std::vector<double> t, a, v, s;
+    for (std::size_t k = 0; k < rows; ++k) {
+      if (!missing && k >= from && k < to) continue;
+      t.push_back(log.recording.time_s[k]);
+      a.push_back(k >= from && k < to ? std::numeric_limits<double>::quiet_NaN() : log.recording.current_a[k]);
+      v.push_back(log.recording.voltage_v[k]);
+      s.push_back(log.recording.soc_ref[k]);
+    }
+    ASSERT_GT(std::abs(log.recording.soc_ref[to] - log.recording.soc_ref[from]), 0.04) << "too little for this test";
+    const SocColumn column = judge_soc_column(recording_of(t, a, v, s, "gap"), capacity_of(log));
+    EXPECT_TRUE(column.is_count) << missing << ": " << sentence_of(column, 0, capacity_of(log));
+  }
 }
 
 TEST(SocColumn, AColumnWithFewValuesOrNoneIsNotBlamed) {

@@ -83,7 +83,10 @@ constexpr double one_day_s = 86'400;
 class LongTable {
  public:
   LongTable(TextLines& lines, const TableLayout& layout, const std::string& path, const ReadOptions& options)
-      : lines_(lines), layout_(layout), at_(*layout.long_table), path_(path), options_(options) {}
+      : lines_(lines), layout_(layout), at_(*layout.long_table), path_(path), options_(options) {
+    if (!options.steps.empty() || !options.cycles.empty())
+      throw BadInput(path, 1, "a table of readings has no steps and cycles, expected neither --steps nor --cycles");
+  }
 
   measurement::Recording read() {
     std::string_view line;

@@ -15,15 +15,17 @@ using measurement::Recording;
 
 namespace {
 
-/// True if most of the readings stand in rows without a current: they were not taken with it.
+/// True if most of the readings stand in rows without a current, and most rows with a current have none: they were not
+/// taken together. Rows that only lack the current, as after a sensor has failed, are ordinary ones.
 bool is_apart(const Column& column, const Column& current) {
-  std::size_t readings = 0, alone = 0;
+  std::size_t readings = 0, alone = 0, currents = 0;
   for (std::size_t k = 0; k < column.size(); ++k) {
+    currents += std::isnan(current[k]) ? 0 : 1;
     if (std::isnan(column[k])) continue;
     ++readings;
     alone += std::isnan(current[k]) ? 1 : 0;
   }
-  return 2 * alone > readings;
+  return 2 * alone > readings && 2 * (readings - alone) < currents;
 }
 
 std::vector<Column*> columns_of(Recording& r) {

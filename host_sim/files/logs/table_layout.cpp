@@ -166,7 +166,8 @@ class HeaderFinder {
   /// Returns false if the line lacks a column that the user named.
   bool take_maps(TableLayout& layout) const {
     for (const auto& [target, column] : maps_) {
-      if (target.number == every_number && column.find('*') != std::string::npos) {
+      const bool cells = target.quantity == Quantity::cell_voltage || target.quantity == Quantity::cell_temperature;
+      if (cells && target.number == every_number) {
         const auto group = group_of(column, layout.headings);
         for (const auto& [number, index] : group) add(layout, index, {target.quantity, number});
         if (group.empty()) return false;

@@ -130,10 +130,11 @@ TEST_F(Dump, EndlessBytesWithoutALineAreRejected) {
 }
 
 TEST(Source, ThatDoesNotExistIsRejected) {
-  for (const char* name : {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch",
-                           "file:/tmp", "usb:0", "../can0", "lo", "a_name_that_no_interface_can_have",
-                           "slcan:/dev/null,rate=300", "file:/dev/zero,base=", "file:/dev/zero,base=0x800",
-                           "file:/dev/zero,stop=1F", "file:/dev/zero,rate=250", "file:/dev/zero,node=3"}) {
+  for (const char* name :
+       {"", "nonesuch0", "can 0", "slcan:/nonesuch", "slcan:/dev/null", "file:/nonesuch", "file:/tmp", "usb:0",
+        "../can0", "lo", "a_name_that_no_interface_can_have", "slcan:/dev/null,rate=300",
+        "file:/dev/zero,base=", "file:/dev/zero,base=0x800", "file:/dev/zero,base=0x7F0", "file:/dev/zero,base=0",
+        "file:/dev/zero,stop=1F", "file:/dev/zero,rate=250", "file:/dev/zero,node=3"}) {
     EXPECT_THROW(open_source(name), SourceError) << name;
   }
 }
