@@ -25,7 +25,6 @@ struct Value {
   double charge = 0;     ///< since the value before, as a fraction of the capacity; 0 where the column is at its end
   double unknown = 0;    ///< of it, because the current within a row is not known
   double voltage_v = 0;  ///< change
-  bool at_end = false;   ///< full or empty, and the charge goes on
 };
 
 double median(std::vector<double> list) {
@@ -65,8 +64,8 @@ std::vector<Value> values_of(const Recording& r, double capacity_ah) {
       v.charge = charge;
       v.unknown = unknown;
       const bool full = v.soc >= 1 - at_the_end && charge > 0, empty = v.soc <= at_the_end && charge < 0;
-      v.at_end = full || empty;
-      if (v.at_end && std::abs(v.change) < std::abs(charge)) v.charge = v.change;
+      const bool at_end = full || empty;  // and the charge goes on
+      if (at_end && std::abs(v.change) < std::abs(charge)) v.charge = v.change;
     }
     if (k < r.voltage_v.size() && !std::isnan(r.voltage_v[k])) {
       v.voltage_v = std::isnan(voltage_v) ? 0 : r.voltage_v[k] - voltage_v;

@@ -1,5 +1,6 @@
-// Whether a text that is about to be written holds a number that is not finite: "nan", "-inf". Every output of the tool
-// passes this check (host_sim/tool/output.cpp), so that a fault of ours is an error and never a result.
+// Whether a text that is about to be written holds a number that is not finite: "nan", "-inf". Summaries and
+// results pass this check (host_sim/tool/output.cpp), so that a fault of ours is an error and never a result; files of
+// import, parameters and images do not.
 #pragma once
 
 #include <string_view>

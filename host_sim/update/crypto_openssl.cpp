@@ -7,6 +7,7 @@
 #include <new>
 
 #include "boot/crypto.hpp"
+#include "update/openssl_pointers.hpp"
 
 namespace bms::boot {
 
@@ -14,14 +15,8 @@ namespace {
 
 EVP_MD_CTX*& context(std::array<std::uint8_t, 112>& state) { return *reinterpret_cast<EVP_MD_CTX**>(state.data()); }
 
-template <auto Free>
-struct Freed {
-  template <class T>
-  void operator()(T* p) const {
-    Free(p);
-  }
-};
-using Key = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
+using update::Freed;
+using Key = update::Pkey;
 using KeyContext = std::unique_ptr<EVP_PKEY_CTX, Freed<EVP_PKEY_CTX_free>>;
 
 Key public_key(const PublicKey& point) {

@@ -15,19 +15,12 @@
 
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
+#include "update/openssl_pointers.hpp"
 
 namespace bms::update {
 
 namespace {
 
-template <auto Free>
-struct Freed {
-  template <class T>
-  void operator()(T* p) const {
-    Free(p);
-  }
-};
-using Pkey = std::unique_ptr<EVP_PKEY, Freed<EVP_PKEY_free>>;
 using Memory = std::unique_ptr<BIO, Freed<BIO_free_all>>;
 
 constexpr const char* curve = "prime256v1";
