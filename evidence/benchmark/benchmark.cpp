@@ -13,10 +13,10 @@
 #include <nlohmann/json.hpp>
 
 #include "benchmark/baselines.hpp"
-#include "benchmark/run_program.hpp"
 #include "benchmark/tables.hpp"
 #include "files/bad_input.hpp"
 #include "files/committed_figures.hpp"
+#include "files/run_program.hpp"
 #include "files/text_file.hpp"
 #include "numerics/in_parallel.hpp"
 
@@ -166,5 +166,5 @@ int main(int argc, char** argv) {
   app.add_option("--readme", o.readme,
                  "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")
       ->type_name("FILE");
-  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

@@ -13,7 +13,7 @@
 #include "benchmark/cause_ids.hpp"
 #include "benchmark/instrument_forms.hpp"
 #include "benchmark/run_case.hpp"
-#include "benchmark/run_program.hpp"
+#include "files/run_program.hpp"
 
 namespace {
 
@@ -93,5 +93,5 @@ int main(int argc, char** argv) {
   app.add_option("seed", o.seed, "seed of the cases")->required();
   app.add_option("--cells", o.cells, "number of healthy recordings")->capture_default_str();
   app.add_option("--only", o.only, "run only forms whose name contains TEXT")->type_name("TEXT");
-  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "benchmark/law_score.hpp"
-#include "benchmark/run_program.hpp"
+#include "files/run_program.hpp"
 #include "numerics/in_parallel.hpp"
 
 namespace {
@@ -67,5 +67,5 @@ int main(int argc, char** argv) {
   app.add_option("--cases", o.cases, "number of cases; effects follow each other in turn")->capture_default_str();
   app.add_option("--first", o.first, "index of the first case")->capture_default_str();
   app.add_option("--only", o.only, "run only effects whose name contains TEXT")->type_name("TEXT");
-  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
-#include "benchmark/calibration_error.hpp"
 #include "benchmark/cause_ids.hpp"
 #include "measurement/statistics.hpp"
+#include "numerics/calibration_error.hpp"
 
 namespace bms::benchmark {
 
@@ -133,7 +133,7 @@ Score score(const std::vector<Outcome>& outcomes) {
   Score s;
   std::vector<double> overlaps;
   double set_sizes = 0, wall_s = 0, experiments = 0;
-  CalibrationError calibration;
+  numerics::CalibrationError calibration;
   for (const Outcome& o : outcomes) {
     wall_s += o.wall_s;
     const CaseKind kind = o.answer.kind;

@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "diagnosis/quantity_text.hpp"
-#include "experiments/splitmix.hpp"
 #include "proof/claims.hpp"
+#include "proof/faults_put_in.hpp"
 #include "proof/procedure.hpp"
 
 namespace bms::proof {
@@ -16,74 +16,44 @@ namespace {
 
 using measurement::Recording;
 
+using AddFault = std::vector<double> (*)(Recording& r, double amount);
+
 // Each adds a fault of the given amount and returns the sizes that the diagnosis should find.
 
-std::vector<double> add_current_offset(Recording& r, double amount_a) {
-  for (double& i : r.current_a.edit()) i += amount_a;
-  return {amount_a};
-}
-
-std::vector<double> add_current_gain(Recording& r, double amount) {
-  for (double& i : r.current_a.edit()) i *= 1 + amount;
+template <void (*put)(Recording&, double)>
+std::vector<double> add(Recording& r, double amount) {
+  put(r, amount);
   return {amount};
 }
 
-/// The current is read some samples late. Size: the delay in seconds.
-std::vector<double> add_skew(Recording& r, double samples) {
-  const auto late = static_cast<std::size_t>(samples);
+/// By some rows, however long they are. Size: the mean delay in seconds.
+std::vector<double> add_skew(Recording& r, double rows) {
+  const auto late = static_cast<std::size_t>(rows);
   std::vector<double>& current_a = r.current_a.edit();
   for (std::size_t k = r.rows(); k-- > 0;) current_a[k] = current_a[k >= late ? k - late : 0];
-  return {samples * r.duration_s() / static_cast<double>(r.rows() - 1)};
+  return {rows * r.duration_s() / static_cast<double>(r.rows() - 1)};
 }
 
-/// The current never reads more than the limit. Sizes: the limit, and the mean current above it.
+/// Sizes: the limit, and the mean current above it.
 std::vector<double> add_clipping(Recording& r, double limit_a) {
   double excess_a = 0;
   std::size_t count = 0;
-  for (double& i : r.current_a.edit()) {
+  for (const double i : r.current_a) {
     if (std::abs(i) <= limit_a) continue;
     excess_a += std::abs(i) - limit_a;
     ++count;
-    i = std::copysign(limit_a, i);
   }
+  put_clipping(r, limit_a);
   return {limit_a, count > 0 ? excess_a / static_cast<double>(count) : 0};
 }
 
-/// A contact resistance from half time on. Sizes: the resistance, and the time.
+/// From half time on. Sizes: the resistance, and the time.
 std::vector<double> add_contact_step(Recording& r, double ohm) {
   const double onset_s = std::round((r.time_s.front() + r.time_s.back()) / 2);
-  for (std::size_t k = 0; k < r.rows(); ++k) {
-    if (r.time_s[k] >= onset_s) r.voltage_v.edit()[k] += ohm * r.current_a[k];
-  }
+  const auto first = std::lower_bound(r.time_s.begin(), r.time_s.end(), onset_s);
+  put_contact(r, ohm, static_cast<std::size_t>(first - r.time_s.begin()));
   return {ohm, onset_s};
 }
-
-/// A contact resistance in bursts of 5 to 30 s with 1 to 7 minutes between them, as of a loose plug.
-std::vector<double> add_contact_bursts(Recording& r, double ohm) {
-  constexpr double pause_min_s = 60, pause_max_s = 400, burst_min_s = 5, burst_max_s = 30;
-  constexpr std::uint64_t seed = 20;
-  experiments::SplitMix random(seed);
-  const auto between = [&](double low, double high) {
-    return low + (high - low) * static_cast<double>(random.bits() >> 11) * 0x1p-53;
-  };
-  double begin_s = r.time_s.front() + between(pause_min_s, pause_max_s),
-         end_s = begin_s + between(burst_min_s, burst_max_s);
-  for (std::size_t k = 0; k < r.rows(); ++k) {
-    if (r.time_s[k] > end_s) {
-      begin_s = end_s + between(pause_min_s, pause_max_s);
-      end_s = begin_s + between(burst_min_s, burst_max_s);
-    }
-    if (r.time_s[k] >= begin_s && r.time_s[k] <= end_s) r.voltage_v.edit()[k] += ohm * r.current_a[k];
-  }
-  return {ohm};
-}
-
-std::vector<double> add_voltage_offset(Recording& r, double amount_v) {
-  for (double& v : r.voltage_v.edit()) v += amount_v;
-  return {amount_v};
-}
-
-using AddFault = std::vector<double> (*)(Recording& r, double amount);
 
 struct FaultCode {
   const char* mechanism;
@@ -91,13 +61,13 @@ struct FaultCode {
   std::size_t sizes;  ///< that it returns
 };
 constexpr FaultCode fault_codes[] = {
-    {"current_offset", add_current_offset, 1},
-    {"current_gain", add_current_gain, 1},
+    {"current_offset", add<put_current_offset>, 1},
+    {"current_gain", add<put_current_gain>, 1},
     {"channel_skew", add_skew, 1},
     {"current_clipping", add_clipping, 2},
     {"contact_step", add_contact_step, 2},
-    {"contact_intermittent", add_contact_bursts, 1},
-    {"voltage_offset", add_voltage_offset, 1},
+    {"contact_intermittent", add<put_contact_in_bursts>, 1},
+    {"voltage_offset", add<put_voltage_offset>, 1},
 };
 
 /// One size of a fault, and how far the diagnosis may be off.

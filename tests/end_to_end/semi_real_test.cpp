@@ -65,8 +65,8 @@ class SemiReal : public ::testing::Test {
   ToolRun run(const std::string& arguments) const {
     const std::string out = (folder_.path() / "stdout").string(), err = (folder_.path() / "stderr").string();
     const int status =
-        std::system((BMS_PYTHON " -B " BMS_SOURCE_DIR "/evidence/benchmark/semi_real.py " BMS_BENCHMARKS " " +
-                     arguments + " >" + out + " 2>" + err)
+        std::system((BMS_PYTHON " -B " BMS_SOURCE_DIR "/evidence/proof/semi_real.py " BMS_BENCHMARKS " " + arguments +
+                     " >" + out + " 2>" + err)
                         .c_str());
     return {WEXITSTATUS(status), content(out), content(err)};
   }

@@ -1,4 +1,4 @@
-#include "benchmark/semi_real_tables.hpp"
+#include "proof/semi_real_tables.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -10,10 +10,10 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "benchmark/calibration_error.hpp"
 #include "measurement/statistics.hpp"
+#include "numerics/calibration_error.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 namespace {
 
@@ -65,7 +65,7 @@ std::string bands_of(const std::vector<Result>& results, const Which& counts) {
 /// Of the first causes that are named, of nulls as well: how many are the fault that was put in, and whether their
 /// probabilities say so.
 nlohmann::ordered_json json_of_probabilities(const std::vector<Result>& results, const Which& counts) {
-  CalibrationError error;
+  numerics::CalibrationError error;
   double sum = 0;
   std::size_t right = 0;
   for (const Result& r : results) {
@@ -295,4 +295,4 @@ std::string line_of(const SemiRealResult& r) {
           : "");
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

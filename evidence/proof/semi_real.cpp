@@ -16,28 +16,28 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
-#include "benchmark/injected_faults.hpp"
-#include "benchmark/real_cell.hpp"
-#include "benchmark/run_program.hpp"
-#include "benchmark/semi_real_tables.hpp"
 #include "diagnosis/prediction_interval.hpp"
+#include "files/run_program.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
 #include "measurement/statistics.hpp"
+#include "proof/faults_put_in.hpp"
+#include "proof/real_cell.hpp"
+#include "proof/semi_real_tables.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace {
 
-using bms::benchmark::injected_faults;
-using bms::benchmark::InjectedFault;
-using bms::benchmark::Prepared;
-using bms::benchmark::RealSet;
-using Result = bms::benchmark::SemiRealResult;
+using bms::proof::injected_faults;
+using bms::proof::InjectedFault;
+using bms::proof::Prepared;
+using bms::proof::RealSet;
+using Result = bms::proof::SemiRealResult;
 using bms::diagnosis::Finding;
 using bms::measurement::Recording;
 
 struct Options {
-  std::string data = "../shared/data", list = "evidence/benchmark/semi_real.toml", only, json;
+  std::string data = "../shared/data", list = "evidence/proof/semi_real.toml", only, json;
   std::vector<std::string> faults;  ///< empty: all
   std::vector<double> times_limit;  ///< sizes, in stated detection limits; empty: those of the fault
   double false_alarm_rate = 0.01;
@@ -144,9 +144,9 @@ std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, doubl
 }
 
 /// The sets of the list that are asked for and whose recordings are there.
-std::vector<RealSet> sets_of(const Options& o, bms::benchmark::Present& present) {
+std::vector<RealSet> sets_of(const Options& o, bms::proof::Present& present) {
   bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
-  std::vector<RealSet> sets = bms::benchmark::read_sets(list);
+  std::vector<RealSet> sets = bms::proof::read_sets(list);
   list.finish();
   std::erase_if(sets, [&](const RealSet& s) {
     return s.name.find(o.only) == std::string::npos || !present.has(s.name, files_of(s));
@@ -157,7 +157,7 @@ std::vector<RealSet> sets_of(const Options& o, bms::benchmark::Present& present)
 
 void run(const Options& o) {
   std::vector<Result> results;
-  bms::benchmark::NotRun not_run;
+  bms::proof::NotRun not_run;
   const auto add = [&](Result r) {
     fmt::print("{}", line_of(r));
     std::fflush(stdout);
@@ -168,7 +168,7 @@ void run(const Options& o) {
   };
   if (o.bands_only)
     fmt::print("| cell | set | within the 95 % band | error, RMS | band, RMS |\n|---|---|---|---|---|\n");
-  bms::benchmark::Present present(o.data);
+  bms::proof::Present present(o.data);
   const std::vector<RealSet> sets = sets_of(o, present);
   not_run.skipped = present.skipped();
   for (const RealSet& set : sets) {
@@ -226,5 +226,5 @@ int main(int argc, char** argv) {
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
   app.add_flag("--bands", o.bands_only, "diagnose nothing: how many readings lie within the band of the prediction");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
-  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

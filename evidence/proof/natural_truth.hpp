@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "benchmark/natural_judge.hpp"
 #include "diagnosis/prepared_recording.hpp"
 #include "diagnosis/verdict.hpp"
 #include "measurement/recording.hpp"
+#include "proof/natural_judge.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 /// A [[case]] of the list: a fault that nobody put in. Paths are relative to the folder of the data.
 struct NaturalCase {
@@ -44,4 +44,4 @@ std::vector<Truth> truths_of(const NaturalCase& c, const measurement::Recording&
 Answer answer_of(const diagnosis::Diagnosis& d, const std::vector<diagnosis::PreparedRecording>& records,
                  const std::vector<Truth>& truths);
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

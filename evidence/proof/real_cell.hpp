@@ -10,7 +10,7 @@
 #include "files/toml_table.hpp"
 #include "measurement/recording.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 /// A [[set]] of the list: recordings of one cell.
 struct RealSet {
@@ -55,4 +55,4 @@ struct Prepared {
 /// Throws a runtime_error if no cell file follows from the recordings. learn_healthy: with [healthy].
 Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_healthy);
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

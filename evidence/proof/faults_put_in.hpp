@@ -7,7 +7,17 @@
 
 #include "measurement/recording.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
+
+void put_voltage_offset(measurement::Recording& recording, double offset_v);
+void put_current_offset(measurement::Recording& recording, double offset_a);
+void put_current_gain(measurement::Recording& recording, double error);
+/// The current never reads more than the limit.
+void put_clipping(measurement::Recording& recording, double limit_a);
+/// A contact resistance from a row on.
+void put_contact(measurement::Recording& recording, double ohm, std::size_t first_row);
+/// A contact resistance in bursts of 5 to 30 s with 1 to 7 minutes between them, as of a loose plug.
+void put_contact_in_bursts(measurement::Recording& recording, double ohm);
 
 /// A fault of the catalogue with three sizes. Sizes scale with the capacity where their unit is that of a current
 /// (per Ah) or of a resistance (times Ah).
@@ -24,4 +34,4 @@ extern const std::array<InjectedFault, 8> injected_faults;
 /// beyond cannot be named.
 bool is_within_bounds(const InjectedFault& fault, double size, double capacity_ah);
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

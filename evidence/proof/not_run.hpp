@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 /// Sets or cases.
 struct NotRun {
@@ -11,4 +11,4 @@ struct NotRun {
   std::size_t without_cell_file = 0;
 };
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

@@ -1,4 +1,4 @@
-#include "benchmark/natural_judge.hpp"
+#include "proof/natural_judge.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 namespace {
 
@@ -109,4 +109,4 @@ Judgement judge(const Answer& answer, const std::vector<Truth>& truths, const st
   return j;
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
-namespace bms::benchmark {
+namespace bms::numerics {
 
 /// Expected calibration error: findings in five bins of their probability. (M. P. Naeini et al., AAAI 2015.)
 class CalibrationError {
@@ -35,4 +35,4 @@ class CalibrationError {
   std::size_t count_ = 0;
 };
 
-}  // namespace bms::benchmark
+}  // namespace bms::numerics

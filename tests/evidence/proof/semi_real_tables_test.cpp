@@ -1,11 +1,11 @@
 // What the summary of faults in real recordings counts.
-#include "benchmark/semi_real_tables.hpp"
+#include "proof/semi_real_tables.hpp"
 
 #include <gmock/gmock.h>
 
-#include "benchmark/injected_faults.hpp"
+#include "proof/faults_put_in.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 namespace {
 
 const InjectedFault& fault(std::string_view id) {
@@ -63,4 +63,4 @@ TEST(SemiReal, ProbabilitiesAreComparedWithHowOftenTheyComeTrue) {
 }
 
 }  // namespace
-}  // namespace bms::benchmark
+}  // namespace bms::proof

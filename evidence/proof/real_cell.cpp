@@ -1,4 +1,4 @@
-#include "benchmark/real_cell.hpp"
+#include "proof/real_cell.hpp"
 
 #include <algorithm>
 #include <filesystem>
@@ -14,7 +14,7 @@
 #include "workflow/diagnose_recordings.hpp"
 #include "workflow/identify_cell.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 namespace {
 
@@ -147,4 +147,4 @@ Prepared prepare(const std::string& data_folder, const RealSet& set, bool learn_
   return p;
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

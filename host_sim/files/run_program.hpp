@@ -9,7 +9,7 @@
 
 #include "files/bad_input.hpp"
 
-namespace bms::benchmark {
+namespace bms::files {
 
 /// Parses the command line and calls run(). Returns the exit code: 0 done; 2 bad usage or bad input, in one line;
 /// 3 internal error.
@@ -23,7 +23,7 @@ int run_program(CLI::App& app, int argc, char** argv, const Run& run) {
     if (error.get_exit_code() == 0) return app.exit(error);
     fmt::print(stderr, "{}: {} (see --help)\n", app.get_name(), error.what());
     return 2;
-  } catch (const files::BadInput& error) {
+  } catch (const BadInput& error) {
     fmt::print(stderr, "{}\n", error.what());
     return 2;
   } catch (const std::exception& error) {
@@ -32,4 +32,4 @@ int run_program(CLI::App& app, int argc, char** argv, const Run& run) {
   }
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::files

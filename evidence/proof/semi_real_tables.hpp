@@ -5,9 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "benchmark/not_run.hpp"
+#include "proof/not_run.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 /// One diagnosis.
 struct SemiRealResult {
@@ -38,4 +38,4 @@ std::string table_of(const std::vector<SemiRealResult>& results);
 /// bounds of a real instrument.
 std::string json_of(const std::vector<SemiRealResult>& results, const NotRun& not_run);
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

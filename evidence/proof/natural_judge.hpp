@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 /// One thing that is truly there.
 struct Truth {
@@ -53,4 +53,4 @@ inline bool made_worse(const Judgement& with_fewer, const Judgement& with_more) 
   return with_more.outcome < (with_fewer.not_visible ? Outcome::undecided : with_fewer.outcome);
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

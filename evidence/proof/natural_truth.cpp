@@ -1,4 +1,4 @@
-#include "benchmark/natural_truth.hpp"
+#include "proof/natural_truth.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,7 @@
 #include "measurement/statistics.hpp"
 #include "model/extended.hpp"
 
-namespace bms::benchmark {
+namespace bms::proof {
 
 namespace {
 
@@ -334,4 +334,4 @@ Answer answer_of(const diagnosis::Diagnosis& d, const std::vector<PreparedRecord
   return answer;
 }
 
-}  // namespace bms::benchmark
+}  // namespace bms::proof

@@ -17,14 +17,14 @@
 #include <CLI/CLI.hpp>
 #include <Eigen/Cholesky>
 
-#include "benchmark/real_cell.hpp"
-#include "benchmark/run_program.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/recording_check.hpp"
 #include "diagnosis/signatures.hpp"
 #include "diagnosis/testability.hpp"
+#include "files/run_program.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
+#include "proof/real_cell.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace {
@@ -38,7 +38,7 @@ using bms::measurement::Recording;
 using Eigen::Index;
 
 struct Options {
-  std::string data = "../shared/data", list = "evidence/benchmark/semi_real.toml", only = "second half";
+  std::string data = "../shared/data", list = "evidence/proof/semi_real.toml", only = "second half";
   double strength = 1;              ///< standard deviation of a shared strength, in what is common of it
   double wander = 0.02;             ///< by which a recording's own strength differs from it, as a share of it
   double resistance_tolerance = 0;  ///< of the cell file; 0: as identified
@@ -288,8 +288,8 @@ std::vector<Fault> faults_for(double capacity_ah) {
   return {{"as it is", [](Recording&) {}}, {"current +6 %", gain}, {"contact, 4 mOhm", contact}, {"15 mV", offset}};
 }
 
-void run_set(const bms::benchmark::RealSet& set, const Options& o) {
-  bms::benchmark::Prepared p = prepare(o.data, set, false);
+void run_set(const bms::proof::RealSet& set, const Options& o) {
+  bms::proof::Prepared p = prepare(o.data, set, false);
   if (o.resistance_tolerance > 0) {
     p.cell.parameters.tolerance.resistance_fraction = o.resistance_tolerance;
     p.cell.parameters.rc.r0_std_ohm = p.cell.parameters.rc.r1_std_ohm = p.cell.parameters.rc.c1_std_f = {};
@@ -314,9 +314,9 @@ void run_set(const bms::benchmark::RealSet& set, const Options& o) {
 
 void run(const Options& o) {
   bms::files::TomlTable list = bms::files::TomlTable::parse(bms::files::read_file(o.list), o.list, "a list of sets");
-  bms::benchmark::Present present(o.data);
+  bms::proof::Present present(o.data);
   fmt::print("| case | change, 2 ln of its evidence | second | third |\n|---|---|---|---|\n");
-  for (const bms::benchmark::RealSet& set : bms::benchmark::read_sets(list)) {
+  for (const bms::proof::RealSet& set : bms::proof::read_sets(list)) {
     if (set.name.find(o.only) != std::string::npos && present.has(set.name, files_of(set))) run_set(set, o);
   }
   list.finish();
@@ -339,5 +339,5 @@ int main(int argc, char** argv) {
   app.add_option("--resistance-tolerance", o.resistance_tolerance, "of the cell file; 0: as identified")
       ->capture_default_str();
   app.add_option("--blocks", o.blocks, "of the healthy recording")->capture_default_str();
-  return bms::benchmark::run_program(app, argc, argv, [&] { run(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

@@ -1,9 +1,9 @@
 // The judgement of answers about faults that nobody put in.
-#include "benchmark/natural_judge.hpp"
+#include "proof/natural_judge.hpp"
 
 #include <gtest/gtest.h>
 
-namespace bms::benchmark {
+namespace bms::proof {
 namespace {
 
 const Truth contact{"contact", {"contact_step", "resistance_growth"}, "ohm", 0.47, 0.014, true, "both voltmeters"},
@@ -60,4 +60,4 @@ TEST(NaturalJudge, MoreDataMakeAnAnswerWorse) {
 }
 
 }  // namespace
-}  // namespace bms::benchmark
+}  // namespace bms::proof

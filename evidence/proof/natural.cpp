@@ -19,34 +19,34 @@
 #include <CLI/CLI.hpp>
 #include <nlohmann/json.hpp>
 
-#include "benchmark/natural_judge.hpp"
-#include "benchmark/natural_truth.hpp"
-#include "benchmark/not_run.hpp"
-#include "benchmark/real_cell.hpp"
-#include "benchmark/run_program.hpp"
 #include "diagnosis/diagnose.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
+#include "files/run_program.hpp"
 #include "files/text_file.hpp"
+#include "proof/natural_judge.hpp"
+#include "proof/natural_truth.hpp"
+#include "proof/not_run.hpp"
+#include "proof/real_cell.hpp"
 #include "workflow/diagnose_recordings.hpp"
 
 namespace {
 
-using bms::benchmark::Answer;
-using bms::benchmark::Given;
-using bms::benchmark::Judgement;
-using bms::benchmark::NaturalCase;
-using bms::benchmark::NotRun;
-using bms::benchmark::Outcome;
-using bms::benchmark::Prepared;
-using bms::benchmark::RealSet;
-using bms::benchmark::Truth;
 using bms::diagnosis::PreparedRecording;
 using bms::measurement::Recording;
+using bms::proof::Answer;
+using bms::proof::Given;
+using bms::proof::Judgement;
+using bms::proof::NaturalCase;
+using bms::proof::NotRun;
+using bms::proof::Outcome;
+using bms::proof::Prepared;
+using bms::proof::RealSet;
+using bms::proof::Truth;
 
 struct Options {
-  std::string data = "../shared/data", sets = "evidence/benchmark/semi_real.toml",
-              list = "evidence/benchmark/natural.toml", only, json;
+  std::string data = "../shared/data", sets = "evidence/proof/semi_real.toml", list = "evidence/proof/natural.toml",
+              only, json;
   bool set_aside = false, all = false, alone = false;
 };
 
@@ -253,12 +253,12 @@ Work read_work(const Options& o) {
     return bms::files::TomlTable::parse(bms::files::read_file(path), path, "a list of recordings");
   };
   bms::files::TomlTable shared = table(o.sets), own = table(o.list);
-  std::vector<RealSet> sets = bms::benchmark::read_sets(shared);
-  for (RealSet& s : bms::benchmark::read_sets(own)) sets.push_back(std::move(s));
+  std::vector<RealSet> sets = bms::proof::read_sets(shared);
+  for (RealSet& s : bms::proof::read_sets(own)) sets.push_back(std::move(s));
   std::vector<NaturalCase> cases = read_cases(own);
   own.finish();
   Work work;
-  bms::benchmark::Present present(o.data);
+  bms::proof::Present present(o.data);
   for (NaturalCase& c : cases) {
     if (c.name.find(o.only) == std::string::npos || (!o.all && c.set_aside != o.set_aside)) continue;
     const auto set = std::find_if(sets.begin(), sets.end(), [&](const RealSet& s) { return s.name == c.set; });
@@ -314,5 +314,5 @@ int main(int argc, char** argv) {
   app.add_flag("--set-aside", o.set_aside, "run the cells that decided nothing instead of those of the development");
   app.add_flag("--all", o.all, "run both");
   app.add_flag("--alone", o.alone, "diagnose each recording alone only");
-  return bms::benchmark::run_program(app, argc, argv, [&] { run_all(o); });
+  return bms::files::run_program(app, argc, argv, [&] { run_all(o); });
 }
