@@ -178,9 +178,9 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
   r.cell = cell;
   r.recording = std::move(recording);
   r.warnings = r.recording.warnings;
-  const std::string text = measurement::soc_column_text(r.recording, cell.parameters.capacity_ah);
-  if (!text.empty()) r.warnings.push_back({"soc_column", text});
   const std::optional<dp::PackFinding> reversed = turn_current(r.recording, cell);
+  r.soc_column = measurement::own_soc_column(r.recording, cell.parameters.capacity_ah);  // counts the turned current
+  measurement::warn_of_soc_column(r.soc_column, r.recording, cell.parameters.capacity_ah, "", r.warnings);
   r.pack = pack_of(r.recording, cell, options.initial_soc);
   dp::PackOptions of_cells;
   of_cells.progress = [&](double done, const std::string& what) {
