@@ -46,9 +46,9 @@ std::string sentence_of(const SocColumn& column, double first_s, double capacity
   if (column.contradicts()) return text + ".";
   const bool capacity = std::any_of(column.events.begin(), column.events.end(),
                                     [](const SocEvent& e) { return e.fault == SocFault::capacity; });
-  return text + (capacity ? fmt::format("; its count, the current sensor or the capacity of {:.3g} Ah is wrong.",
-                                        capacity_ah)
-                          : "; its count or the current sensor is wrong.");
+  return text +
+         (capacity ? fmt::format("; its count, the current sensor or the capacity of {:.3g} Ah is wrong.", capacity_ah)
+                   : "; its count or the current sensor is wrong.");
 }
 
 std::optional<SocColumn> own_soc_column(const Recording& recording, double capacity_ah) {

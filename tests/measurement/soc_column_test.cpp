@@ -182,8 +182,7 @@ TEST(SocColumn, ACountWithAnotherCapacityInRowsOfAMinuteIsNotATable) {
     ASSERT_EQ(column.events.size(), 1U) << ratio << ": " << sentence_of(column, 0, 100);
     EXPECT_EQ(column.events.front().fault, SocFault::capacity) << sentence_of(column, 0, 100);
     EXPECT_NEAR(column.events.front().size, 100 / ratio, 2);
-    EXPECT_NE(sentence_of(column, 0, 100).find(" Ah, not with 100 Ah;"),
-              std::string::npos)
+    EXPECT_NE(sentence_of(column, 0, 100).find(" Ah, not with 100 Ah;"), std::string::npos)
         << sentence_of(column, 0, 100);
     EXPECT_NE(sentence_of(column, 0, 100).find("or the capacity of 100 Ah is wrong"), std::string::npos);
   }
