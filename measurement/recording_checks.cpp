@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "measurement/silent_current.hpp"
 #include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
 #include "model/ocv_voltage.hpp"
@@ -163,6 +164,9 @@ void check_recording(Recording& r) {
     r.warnings.push_back(
         {"soc_ref_in_percent", "soc_ref is far outside 0 to 1: it looks like percent, expected a fraction"});
   }
+  if (r.rows() == 0) return;
+  if (std::string text = silent_current_text(silent_currents(r), r.time_s.front()); !text.empty())
+    r.warnings.push_back({"current_silent", std::move(text)});
 }
 
 void compare_with_cell(Recording& r, const model::CellParameters<>& cell) {

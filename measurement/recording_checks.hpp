@@ -4,6 +4,7 @@
 //   duplicate_time        has rows with the time of the previous row                check_recording
 //   gap                   has a time step far above the median                      check_recording
 //   current_inverted      has a voltage that falls where the current rises          check_recording
+//   current_silent        has a current of exactly 0 while the voltage shows a load check_recording
 //   soc_ref_in_percent    has a soc_ref far outside 0 .. 1                          check_recording
 //   voltage_in_mv         has voltages that only make sense in millivolts           compare_with_cell
 //   pack_voltage          has voltages of several cells in series                   compare_with_cell

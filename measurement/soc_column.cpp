@@ -1,11 +1,10 @@
-#include "measurement/soc_column_text.hpp"
+#include "measurement/soc_column.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-
-#include <fmt/format.h>
+#include <utility>
 
 namespace bms::measurement {
 
@@ -16,7 +15,9 @@ constexpr double limit = 0.02;           ///< of a change that no charge explain
 constexpr double least_step = 0.005;     ///< of an increment
 constexpr double at_the_end = 0.005;     ///< a column that is full or empty stays there
 constexpr double together_s = 120;       ///< a correction may take so long
+constexpr double most_before = 50;       ///< a jump begins where at least this part of it is
 constexpr double least_capacity = 0.05;  ///< relative difference
+constexpr double block_charge = 0.02;    ///< smallest part of the log whose change and charge are compared
 constexpr double mad_to_sigma = 1.4826, sigmas = 6;
 
 /// One value of the column and what happened since the value before.
@@ -79,6 +80,18 @@ std::vector<Value> values_of(const Recording& r, double capacity_ah) {
   return values;
 }
 
+/// The coarsest grid on which all values lie, up to quarters; 0: finer than 0.01 %.
+double grid_of(const std::vector<Value>& values) {
+  constexpr std::array steps = {0.25, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001, 1e-4};
+  for (const double step : steps) {
+    const bool on_it = std::all_of(values.begin(), values.end(), [step](const Value& v) {
+      return std::abs(v.soc / step - std::round(v.soc / step)) < 1e-3;
+    });
+    if (on_it) return step;
+  }
+  return 0;
+}
+
 /// The step of the column: nine of ten of its changes are not larger, and the smallest.
 struct Resolution {
   double usual = 0, smallest = 0;
@@ -88,7 +101,8 @@ Resolution resolution_of(const std::vector<Value>& values) {
   for (const Value& v : values) {
     if (std::abs(v.change) > 1e-9) changes.push_back(std::abs(v.change));
   }
-  if (changes.size() < 3) return {};
+  constexpr std::size_t fewest_changes = 3;  // fewer may each be a jump: then the values themselves say the step
+  if (changes.size() < fewest_changes) return {grid_of(values), grid_of(values)};
   std::sort(changes.begin(), changes.end());
   const std::size_t at = changes.size() < fewest_values ? changes.size() / 2 : changes.size() * 9 / 10;
   return {changes[at], changes.front()};
@@ -140,11 +154,12 @@ class Judge {
     if (values_.size() < fewest_values) return column;
     step_ = resolution_of(values_);
     column.resolution = step_.usual >= 1e-4 ? step_.usual : 0;
-    if (!find_table()) {
+    const double by_blocks = ratio_of_blocks();
+    if (!find_table(by_blocks)) {
       find_unmoved();
-      find_jumps(1);
+      find_jumps(by_blocks);
       const double ratio = find_slopes(false);
-      if (ratio != 1) {
+      if (ratio != by_blocks) {
         std::erase_if(events_, [](const SocEvent& e) { return e.fault != SocFault::stuck; });
         find_jumps(ratio);
       }
@@ -164,12 +179,38 @@ class Judge {
     return mad_to_sigma * median(std::move(rest));
   }
 
+  /// Median over parts of the log of change / charge, by charge: a jump or a stretch that does not move is in few of
+  /// them. 1 where it is nearly that, or where there are few parts: the current counts with the capacity.
+  double ratio_of_blocks() const {
+    constexpr std::size_t fewest_blocks = 8;
+    std::vector<std::pair<double, double>> blocks;  // ratio, weight
+    double change = 0, charge = 0, unknown = 0, total = 0;
+    for (const Value& v : values_) {
+      change += v.change;
+      charge += v.charge;
+      unknown += v.unknown;
+      if (std::abs(charge) < block_charge + 4 * step_.usual + unknown) continue;
+      blocks.emplace_back(change / charge, std::abs(charge));
+      total += std::abs(charge);
+      change = charge = unknown = 0;
+    }
+    if (blocks.size() < fewest_blocks) return 1;
+    std::sort(blocks.begin(), blocks.end());
+    double below = 0;
+    for (const auto& [ratio, weight] : blocks) {
+      below += weight;
+      if (below < total / 2) continue;
+      return std::abs(ratio - 1) > least_capacity && ratio > 0 ? ratio : 1;
+    }
+    return 1;
+  }
+
   /// Many increments that no charge explains have the sign of the voltage's: a table.
-  bool find_table() {
+  bool find_table(double ratio) {
     std::size_t steps = 0, alike = 0;
     double largest = 0, first_s = values_.front().time_s;
     for (const Value& v : values_) {
-      const double rest = v.change - v.charge;
+      const double rest = v.change - ratio * v.charge;
       if (std::abs(rest) < 1.05 * step_.smallest + least_step + v.unknown || std::abs(v.voltage_v) < 1e-4) continue;
       if (steps++ == 0) first_s = v.time_s;
       alike += rest * v.voltage_v > 0 ? 1 : 0;
@@ -206,8 +247,10 @@ class Judge {
   void find_jumps(double ratio) {
     jump_.assign(values_.size(), 0);
     const double noise_now = sigmas * noise(ratio);
+    const double least = limit + 1.05 * step_.usual + noise_now;  // of a jump
     for (std::size_t k = 1; k < values_.size(); ++k) {
-      if (unmoved_[k]) continue;
+      const double here = values_[k].change - ratio * values_[k].charge;
+      if (unmoved_[k] || std::abs(here) < least / most_before) continue;
       double sum = 0, unknown = 0, largest = 0;
       std::size_t end = k, at = k;
       std::size_t best_end = k;
@@ -222,14 +265,13 @@ class Judge {
           largest = std::abs(rest);
           at = end;
         }
-        const double beyond = std::abs(sum) - (limit + 1.05 * step_.usual + unknown + noise_now);
+        const double beyond = std::abs(sum) - (least + unknown);
         if (std::abs(rest) > least_step + noise_now / 2 && beyond > 0 && std::abs(sum) > std::abs(best)) {
           best = sum;
           best_end = end;
         }
       }
-      const double here = values_[k].change - ratio * values_[k].charge;
-      if (best == 0 || std::abs(here) < std::abs(best) / 50) continue;
+      if (best == 0 || std::abs(here) < std::abs(best) / most_before) continue;
       for (std::size_t j = k; j <= best_end; ++j) jump_[j] = values_[j].change - ratio * values_[j].charge;
       const bool full = best > 0 && values_[best_end].soc >= 1 - at_the_end;
       events_.push_back({values_[at].time_s, full ? SocFault::reset : SocFault::jump, best});
@@ -298,25 +340,6 @@ class Judge {
   std::vector<SocEvent> events_;
 };
 
-std::string event_text(const SocEvent& e, double first_s, double capacity_ah) {
-  const std::string time = fmt::format("{:.0f} s", e.time_s - first_s);
-  switch (e.fault) {
-    case SocFault::jump:
-      return fmt::format("jumps by {:+.1f} % at {}", 100 * e.size, time);
-    case SocFault::reset:
-      return fmt::format("is set to 100 % at {}, {:.1f} % more than the charge explains", time, 100 * e.size);
-    case SocFault::stuck:
-      return fmt::format("does not move from {} on while {:.1f} % of the capacity flow", time, 100 * e.size);
-    case SocFault::drift:
-      return fmt::format("drifts from {} on, by {:+.1f} % until the end", time, 100 * e.size);
-    case SocFault::capacity:
-      return fmt::format("counts with {:.3g} Ah, the cell has {:.3g} Ah", e.size, capacity_ah);
-    case SocFault::table:
-      return fmt::format("follows the voltage, with changes of up to {:.1f} % that no charge explains", 100 * e.size);
-  }
-  return "";
-}
-
 }  // namespace
 
 bool SocColumn::contradicts() const {
@@ -327,27 +350,6 @@ bool SocColumn::contradicts() const {
 SocColumn judge_soc_column(const Recording& recording, double capacity_ah) {
   if (recording.soc_ref.size() != recording.rows() || recording.rows() == 0) return {};
   return Judge(recording, capacity_ah).judge();
-}
-
-const char* name_of(SocFault fault) {
-  constexpr std::array names = {"jump", "reset", "stuck", "drift", "capacity", "table"};
-  return names[static_cast<std::size_t>(fault)];
-}
-
-std::string sentence_of(const SocColumn& column, double first_s, double capacity_ah) {
-  if (column.is_count) return {};
-  constexpr std::size_t most_named = 4;
-  std::string text = column.contradicts() ? "The SOC column of the log is not a count of its current: it "
-                                          : "The SOC column of the log and its current disagree: it ";
-  for (std::size_t k = 0; k < std::min(most_named, column.events.size()); ++k)
-    text += (k == 0 ? "" : ", ") + event_text(column.events[k], first_s, capacity_ah);
-  if (column.events.size() > most_named) text += fmt::format(" and {} more", column.events.size() - most_named);
-  return text + (column.contradicts() ? "." : "; its count or the current sensor is wrong.");
-}
-
-std::string soc_column_text(const Recording& recording, double capacity_ah) {
-  if (recording.rows() == 0) return {};
-  return sentence_of(judge_soc_column(recording, capacity_ah), recording.time_s.front(), capacity_ah);
 }
 
 }  // namespace bms::measurement

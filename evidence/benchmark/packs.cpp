@@ -1,7 +1,7 @@
 // Diagnoses simulated packs (truth/packs.hpp) and scores the answers.
 //
-//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--only FAULT] [--reversed] [--json FILE] [--readme FILE]
-//              [--write FOLDER]
+//   packs SEED [--faulty 60] [--healthy 60] [--first 0] [--only FAULT] [--rows S] [--reversed] [--json FILE]
+//              [--readme FILE] [--write FOLDER]
 #include <atomic>
 #include <filesystem>
 #include <mutex>
@@ -28,6 +28,7 @@ struct Options {
   std::uint64_t seed = 1;
   std::size_t faulty = 60, healthy = 60, first = 0;
   unsigned jobs = 1;
+  double rows_s = 0;
   bool no_shared = false, reversed = false;
   std::string json, only, readme, write;
 };
@@ -80,6 +81,30 @@ void reverse(truth::PackCase& c) {
   c.faults.push_back({.id = "current_sign", .cell = {}, .size = 1});
 }
 
+/// Rows of `rows_s`: voltages and temperatures of their last moment, the mean of the current.
+void slow_down(truth::PackSeries& s, double rows_s) {
+  truth::PackSeries slow = s;
+  const auto of_rows = [&](const std::vector<double>& column, bool mean) {
+    std::vector<double> values;
+    double sum = 0, count = 0, since_s = s.time_s.front();
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      sum += column[k];
+      ++count;
+      if (s.time_s[k] - since_s < rows_s && k > 0) continue;
+      values.push_back(mean ? sum / count : column[k]);
+      sum = count = 0;
+      since_s = s.time_s[k];
+    }
+    return values;
+  };
+  slow.time_s = of_rows(s.time_s, false);
+  slow.current_a = of_rows(s.current_a, true);
+  for (auto* columns : {&slow.cell_v, &slow.sensor_c})
+    for (auto& column : *columns) column = of_rows(column, false);
+  slow.pack_v = of_rows(s.pack_v, false);
+  s = std::move(slow);
+}
+
 void run(const Options& o) {
   const std::size_t count = o.faulty + o.healthy;
   std::vector<PackOutcome> outcomes(count);
@@ -91,6 +116,7 @@ void run(const Options& o) {
       const std::size_t index = o.first + (healthy ? k - o.faulty : k);
       truth::PackCase c = truth::make_pack(o.seed, index, healthy, o.only);
       if (o.reversed) reverse(c);
+      if (o.rows_s > 0) slow_down(c.recording, o.rows_s);
       if (!o.write.empty()) write_case(o.write, index, c);
       outcomes[k] = run_pack(c, !o.no_shared);
       const std::scoped_lock lock(printing);
@@ -121,6 +147,7 @@ int main(int argc, char** argv) {
   app.add_option("--jobs", o.jobs, "packs at the same time")->check(CLI::Range(1, 64))->capture_default_str();
   app.add_flag("--no-shared", o.no_shared, "do not diagnose the mean of the cells: faster");
   app.add_flag("--reversed", o.reversed, "reverse the sign of every current sensor");
+  app.add_option("--rows", o.rows_s, "take a row every so many seconds; 0: as recorded")->type_name("SECONDS");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme, "write the table between '<!-- figures: packs -->' and its end")
       ->type_name("FILE");

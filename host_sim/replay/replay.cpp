@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "identification/goodness_of_fit.hpp"
+#include "measurement/soc_column_text.hpp"
 #include "replay/capacity_estimate.hpp"
 #include "replay/replay_run.hpp"
 #include "replay/simulation.hpp"
@@ -216,11 +217,10 @@ void evaluate(ReplayResult& result) {
             .temperature_c = r.temperature_c,
             .initial_soc = open_loop_start(result)},
            [&](const SimulatedRow& row) { result.open_loop_v.push_back(row.voltage_v); });
-  const bool instrument = !r.current_ref_a.empty();  // its state of charge follows the reference current
   result.capacity = estimate_capacity(result);
   // a count with the file's capacity is wrong if the cell has another one
   const double capacity_ah = capacity_differs(result) ? result.capacity->value_ah : result.cell.parameters.capacity_ah;
-  if (!r.soc_ref.empty() && !instrument) result.soc_column = measurement::judge_soc_column(r, capacity_ah);
+  result.soc_column = measurement::own_soc_column(r, capacity_ah);
   result.soc = soc_figures(result);
   result.reasons = reasons_of(result);
   result.voltage = voltage_figures(result);

@@ -243,8 +243,7 @@ Json experiment_of(const diagnosis::NextExperiment& next, const std::string& the
 /// The SOC column of the first recording that has one of its own; null without one.
 Json soc_column_of_first(const workflow::DiagnoseResult& r) {
   for (const workflow::RecordingComparison& of : r.recordings) {
-    if (of.recording.soc_ref.empty() || !of.recording.current_ref_a.empty()) continue;
-    return soc_column_of(measurement::judge_soc_column(of.recording, r.cell.parameters.capacity_ah));
+    if (of.soc_column) return soc_column_of(of.soc_column);
   }
   return nullptr;
 }

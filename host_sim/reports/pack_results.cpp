@@ -200,9 +200,7 @@ std::string json_of(const workflow::PackResult& r) {
                   {"not_visible", std::move(not_visible)},
                   {"reference_cells", std::move(reference)},
                   {"noise_floor_v", number(d.noise_v)},
-                  {"soc_column", r.recording.soc_ref.empty() ? Json(nullptr)
-                                                             : soc_column_of(measurement::judge_soc_column(
-                                                                   r.recording, r.cell.parameters.capacity_ah))},
+                  {"soc_column", soc_column_of(r.soc_column)},
                   {"wall_s", r.wall_s},
                   {"warnings", warnings_of(r.warnings)}});
 }

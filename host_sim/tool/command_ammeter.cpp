@@ -115,6 +115,7 @@ std::string undecided_text(const Ammeter& a, const std::string& recording) {
 }
 
 std::string statement_of(const AmmeterOptions& o, const Ammeter& a) {
+  if (!a.silent.empty()) return fmt::format("The sensor is not always read: {}.", a.silent);
   if (a.clipping_a.value) return fmt::format("The current sensor is clipped {}.", clipping_text(a.clipping_a));
   const ammeter::Balance balance = ammeter::balance_of(a);
   if (balance == ammeter::Balance::undecided) return undecided_text(a, o.recording);
@@ -171,6 +172,7 @@ std::string json_of(const AmmeterOptions& o, const measurement::Recording& recor
               {"gain", finding_json(a.gain)},
               {"dead_band_a", finding_json(a.dead_band_a)},
               {"clipping_a", finding_json(a.clipping_a)},
+              {"silent", a.silent.empty() ? Json() : Json(a.silent)},
               {"missed_a", a.missed_a},
               {"residual_v", a.residual_v ? Json(*a.residual_v) : Json()},
               {"correction", {{"gain", c.gain}, {"offset_a", c.offset_a}}},
@@ -185,6 +187,7 @@ std::vector<std::pair<std::string, std::string>> findings_of(const Ammeter& a) {
                                                             {"gain", gain_text(a.gain)},
                                                             {"dead band", dead_band_text(a.dead_band_a)},
                                                             {"clipping", clipping_text(a.clipping_a)}};
+  if (!a.silent.empty()) found.emplace_back("reads 0", a.silent);
   if (!a.by_reference) found.insert(found.begin(), {"charge", balance_text(a)});
   return found;
 }

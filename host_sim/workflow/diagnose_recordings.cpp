@@ -65,15 +65,16 @@ RecordingComparison read(const std::string& path, const files::ReadOptions& read
   measurement::Recording r = read_for_diagnosis(path, reading, input.cell);
   measurement::compare_with_cell(r, input.cell.parameters);
   for (const measurement::Warning& w : r.warnings) input.warnings.push_back({w.id, path + ": " + w.text});
-  if (r.current_ref_a.empty()) {  // otherwise the state of charge is that of a reference instrument
-    const std::string text = measurement::soc_column_text(r, input.cell.parameters.capacity_ah);
-    if (!text.empty()) input.warnings.push_back({"soc_column", path + ": " + text});
-  }
+  const double capacity_ah = input.cell.parameters.capacity_ah;
+  auto soc_column = measurement::own_soc_column(r, capacity_ah);
+  measurement::warn_of_soc_column(soc_column, r, capacity_ah, path + ": ", input.warnings);
   const RecordingStart found = recording_start(r, input.cell, given);
   if (!found.origin.empty()) input.notes.push_back({"initial_soc", path + ": " + found.origin});
   if (!found.contradiction.empty())
     input.warnings.push_back({"start_contradicted", fmt::format("{}: {}; {}", path, found.contradiction, consequence)});
-  return prepared(std::move(r), std::filesystem::path(path).filename().string(), input.cell, found.start);
+  auto comparison = prepared(std::move(r), std::filesystem::path(path).filename().string(), input.cell, found.start);
+  comparison.soc_column = std::move(soc_column);
+  return comparison;
 }
 
 bool same_readings(const measurement::Recording& a, const measurement::Recording& b) {
@@ -124,7 +125,7 @@ RecordingComparison prepared(measurement::Recording r, const std::string& name, 
                                       .checks = {},
                                       .other_initial_soc = start.contradicted_by};
   diagnosis::average_references(record, r.current_ref_a, r.voltage_ref_v, cell.parameters);
-  return {std::move(r), std::move(record), {}, {}, {}};
+  return {std::move(r), std::move(record), {}, {}, {}, {}};
 }
 
 diagnosis::Coverage coverage_of(const files::CellFile& cell, const diagnosis::PreparedRecording& record) {

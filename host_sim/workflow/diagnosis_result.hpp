@@ -10,6 +10,7 @@
 #include "diagnosis/prediction_interval.hpp"
 #include "files/cell_file.hpp"
 #include "files/recording.hpp"
+#include "measurement/soc_column.hpp"
 
 namespace bms::workflow {
 
@@ -28,8 +29,9 @@ struct SocErrors {
 struct RecordingComparison {
   measurement::Recording recording;
   diagnosis::PreparedRecording record;
-  std::vector<double> base_v, extended_v;  ///< open loop, by row
-  diagnosis::PredictionInterval interval;  ///< around extended_v
+  std::vector<double> base_v, extended_v;            ///< open loop, by row
+  diagnosis::PredictionInterval interval;            ///< around extended_v
+  std::optional<measurement::SocColumn> soc_column;  ///< judgement of soc_ref with the capacity of the cell file
 };
 
 struct DiagnoseResult {

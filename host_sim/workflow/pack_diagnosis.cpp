@@ -10,10 +10,12 @@
 #include "diagnosis/pack/current_sign.hpp"
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "diagnosis/quantity_text.hpp"
 #include "diagnosis/texts.hpp"
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
 #include "measurement/recording_checks.hpp"
+#include "measurement/silent_current.hpp"
 #include "measurement/soc_column_text.hpp"
 #include "measurement/statistics.hpp"
 #include "replay/replay.hpp"
@@ -75,6 +77,25 @@ std::optional<replay::SocPrior> start_of(const measurement::Recording& r, const 
   return std::nullopt;
 }
 
+/// A sensor that reads 0 under load: the filter does without these rows, and the count does not test the sensor.
+std::optional<dp::PackFinding> silent_current(measurement::Recording& r, std::string& charge_unknown) {
+  const std::vector<measurement::SilentCurrent> silent = measurement::silent_currents(r);
+  if (silent.empty()) return std::nullopt;
+  dp::PackFinding f;
+  f.cause = dp::Cause::current_silent;
+  f.probability = 1;
+  std::vector<double> current_a = r.current_a.copy();
+  for (const measurement::SilentCurrent& s : silent) {
+    f.value += s.to_s - s.from_s;
+    std::fill(current_a.begin() + static_cast<std::ptrdiff_t>(s.rows.begin),
+              current_a.begin() + static_cast<std::ptrdiff_t>(s.rows.end), std::nan(""));
+  }
+  r.current_a = std::move(current_a);
+  f.because = diagnosis::capitalised(measurement::silent_current_text(silent, r.time_s.front())) + ".";
+  charge_unknown = "the current reads exactly 0 under load, and the charge of that time is not counted";
+  return f;
+}
+
 /// Turns a reversed current, so that the rest of the diagnosis is possible.
 std::optional<dp::PackFinding> turn_current(measurement::Recording& r, const files::CellFile& cell) {
   std::vector<std::vector<double>> cell_v;
@@ -95,7 +116,8 @@ dp::PackRecording pack_of(const measurement::Recording& r, const files::CellFile
                          .soc = {},
                          .cell_v = {},
                          .sensor_c = {},
-                         .pack_v = r.pack_voltage_v.copy()};
+                         .pack_v = r.pack_voltage_v.copy(),
+                         .charge_unknown = {}};
   for (const measurement::Column& c : r.cell_voltage_v) pack.cell_v.push_back(c.copy());
   for (const measurement::Column& c : r.cell_temperature_c) pack.sensor_c.push_back(c.copy());
   const measurement::Recording median = one_cell(r, median_cell_v(r));
@@ -112,6 +134,10 @@ bool is_of_the_current_sensor(std::string_view id) { return id.starts_with("curr
 std::string not_shared(const PackResult& r) {
   if (2 * r.diagnosis.channels.repeated().size() > r.diagnosis.cells)
     return "Not tested: most readings are repeated, so that the mean of the cells has no defined time.";
+  if (!r.pack.charge_unknown.empty()) return "Not tested: " + r.pack.charge_unknown + ".";
+  if (r.diagnosis.another_cell)
+    return "Not tested: the open-circuit voltage of these cells is not that of the cell file, which is of another "
+           "cell.";
   if (measurement::usual_step_s(r.recording) > longest_step_s)
     return fmt::format("Not tested: rows are more than {:.0f} s apart.", longest_step_s);
   if (r.diagnosis.duration_s > longest_hours * 3'600)
@@ -178,10 +204,13 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
   r.cell = cell;
   r.recording = std::move(recording);
   r.warnings = r.recording.warnings;
-  const std::string text = measurement::soc_column_text(r.recording, cell.parameters.capacity_ah);
-  if (!text.empty()) r.warnings.push_back({"soc_column", text});
   const std::optional<dp::PackFinding> reversed = turn_current(r.recording, cell);
+  r.soc_column = measurement::own_soc_column(r.recording, cell.parameters.capacity_ah);  // counts the turned current
+  measurement::warn_of_soc_column(r.soc_column, r.recording, cell.parameters.capacity_ah, "", r.warnings);
+  std::string charge_unknown;
+  const std::optional<dp::PackFinding> silent = silent_current(r.recording, charge_unknown);
   r.pack = pack_of(r.recording, cell, options.initial_soc);
+  r.pack.charge_unknown = charge_unknown;
   dp::PackOptions of_cells;
   of_cells.progress = [&](double done, const std::string& what) {
     if (options.progress) options.progress(cells_end * done, what);
@@ -194,7 +223,9 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
                                                                "by more than a cell can change; they are left out",
                                                                c + 1, count)});
   }
-  if (reversed) r.diagnosis.findings.push_back(*reversed);
+  for (const auto& of_sensor : {reversed, silent}) {
+    if (of_sensor) r.diagnosis.findings.push_back(*of_sensor);
+  }
   r.shared = options.shared ? not_shared(r) : "Not tested: not wanted.";
   if (r.shared.empty()) add_shared(r, options.initial_soc, options.progress);
   dp::conclude(r.diagnosis);

@@ -11,6 +11,7 @@
 #include "files/cell_file.hpp"
 #include "files/read_options.hpp"
 #include "measurement/recording.hpp"
+#include "measurement/soc_column.hpp"
 #include "workflow/progress.hpp"
 
 namespace bms::workflow {
@@ -29,6 +30,7 @@ struct PackResult {
   measurement::Recording recording;
   diagnosis::pack::PackRecording pack;
   diagnosis::pack::PackDiagnosis diagnosis;
+  std::optional<measurement::SocColumn> soc_column;
   std::string shared;  ///< what the mean of the cells shows, or why it was not tested
   double wall_s = 0;
   std::vector<measurement::Warning> warnings;

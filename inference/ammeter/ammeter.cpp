@@ -12,6 +12,7 @@
 #include "ammeter/ammeter_at_rest.hpp"
 #include "ammeter/ammeter_by_cell.hpp"
 #include "files/bad_input.hpp"
+#include "measurement/silent_current.hpp"
 
 namespace bms::ammeter {
 
@@ -252,6 +253,14 @@ void gain_by_cell(const AmmeterByCell& found, const std::optional<double>& capac
 /// What the sensor reads at the rests of the log.
 void offset_at_rest(const measurement::Recording& recording, const files::CellFile& cell, Ammeter& ammeter) {
   SensorFinding at_rest = reading_at_rest(recording, cell);
+  if (const auto& balance = ammeter.balance_a.value; at_rest.value && balance) {
+    const double apart_a = std::abs(balance->value - at_rest.value->value);
+    const bool balanced = std::abs(balance->value) <= corrected_sigmas * balance->std;
+    if (balanced && apart_a > corrected_sigmas * std::hypot(balance->std, at_rest.value->std))
+      at_rest = {{},
+                 fmt::format("it reads {} at rest, and the voltages show that this current flows",
+                             amperes(at_rest.value->value))};
+  }
   if (at_rest.value && !ammeter.dead_band_a.value)
     ammeter.offset_a = std::move(at_rest);
   else if (at_rest.value)
@@ -264,6 +273,11 @@ void offset_at_rest(const measurement::Recording& recording, const files::CellFi
 
 /// The charge balance is missing if charge is missing in the count.
 void without_lost_charge(Ammeter& ammeter) {
+  if (!ammeter.silent.empty()) {
+    ammeter.balance_a = {{}, "not visible here: the reading is 0 under load, and that charge is missing in the count"};
+    ammeter.gain = ammeter.balance_a;
+    return;
+  }
   const double known_to_a = ammeter.balance_a.value ? ammeter.balance_a.value->std : 0;
   if (ammeter.clipping_a.value) {
     ammeter.balance_a = {{},
@@ -299,6 +313,7 @@ Ammeter examine_ammeter(const measurement::Recording& recording, const files::Ce
     ammeter.clipping_a.why = found.offset_a.why;
   else
     find_clipping(recording, all, beyond_by_voltage(found, mean_r0_ohm(found, cell)), ammeter);
+  ammeter.silent = measurement::silent_current_text(measurement::silent_currents(recording), recording.time_s.front());
   without_lost_charge(ammeter);
   if (open_contactors == nullptr) {
     offset_at_rest(recording, cell, ammeter);

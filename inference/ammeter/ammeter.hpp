@@ -39,6 +39,7 @@ struct Ammeter {
   bool open_contactors = false;  ///< offset_a was read while no current could flow
   SensorFinding gain;            ///< as a fraction
   SensorFinding dead_band_a;     ///< below this current the reading is 0
+  std::string silent;            ///< where the reading is 0 under load; empty: nowhere
   SensorFinding clipping_a;  ///< the largest reading, if the current goes beyond it; its sign is that of the current
   double missed_a = 0;       ///< mean current beyond the largest reading while it is clipped
   double largest_reading_a = 0;

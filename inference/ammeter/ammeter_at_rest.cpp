@@ -12,9 +12,13 @@ namespace bms::ammeter {
 
 namespace {
 
-constexpr double rest_c = 0.1;        ///< a larger reading is a load, in capacities per hour
-constexpr double constant_c = 0.005;  ///< readings of a rest are that close to their mean
-constexpr double noise_sigmas = 4;    ///< or that close in standard deviations of the cell file's noise
+constexpr double rest_c = 0.1;           ///< a larger reading is a load, in capacities per hour
+constexpr double constant_c = 0.005;     ///< readings of a rest are that close to their mean
+constexpr double rest_alone_c = 5e-4;    ///< the same in a log of rest alone, where no load shows what is small
+constexpr double most_rest_c = 0.01;     ///< a larger constant reading is a slow charge or discharge
+constexpr double rest_step_share = 0.3;  ///< of the range of its parts, as their standard deviation at least
+constexpr double shortest_log_s = 1'800;
+constexpr double noise_sigmas = 4;  ///< or that close in standard deviations of the cell file's noise
 constexpr double shortest_rest_s = 120;
 constexpr double longest_part_s = 600;  ///< a longer rest counts as several, which show the drift of the sensor
 constexpr std::size_t fewest_rows = 5, fewest_rests = 3, fewest_open_readings = 30;
@@ -25,6 +29,45 @@ double scatter_of(const std::vector<double>& values) {
   double squares = 0;
   for (const double v : values) squares += (v - mean) * (v - mean);
   return values.size() < 2 ? 0 : std::sqrt(squares / static_cast<double>(values.size() - 1));
+}
+
+/// A log without any load, as one rest: parts of ten minutes, or of five rows.
+SensorFinding reading_of_rest_alone(const measurement::Recording& r, const files::CellFile& cell) {
+  SensorFinding found;
+  const double band_a =
+      std::max(rest_alone_c * cell.parameters.capacity_ah, noise_sigmas * cell.parameters.noise.current_a);
+  std::vector<double> parts, readings;
+  bool all_zero = true;
+  for (std::size_t k = 0, first = 0; k < r.rows(); ++k) {
+    if (std::isfinite(r.current_a[k])) readings.push_back(r.current_a[k]);
+    all_zero = all_zero && !(std::abs(r.current_a[k]) > 0);
+    if (k + 1 < r.rows() && (readings.size() < fewest_rows || r.time_s[k] - r.time_s[first] < longest_part_s)) continue;
+    if (!readings.empty()) parts.push_back(measurement::mean(readings));
+    readings.clear();
+    first = k + 1;
+  }
+  const double hours = r.duration_s() / 3'600;
+  if (parts.size() < fewest_rests || hours * 3'600 < shortest_log_s) {
+    found.why = "half an hour of rest in which nothing is connected would show it";
+    return found;
+  }
+  if (all_zero) {
+    found.why =
+        fmt::format("during {:.1f} h of rest it reads exactly 0, which is right or written by the device", hours);
+    return found;
+  }
+  const auto [low, high] = std::minmax_element(parts.begin(), parts.end());
+  if (*high - *low > 2 * band_a) {
+    found.why = fmt::format("no reading is a load, and it changes from {:.3f} to {:.3f} A: a small load is switched",
+                            *low, *high);
+    return found;
+  }
+  found.value = {measurement::mean(parts), std::max(scatter_of(parts), rest_step_share * (*high - *low))};
+  found.why = fmt::format(
+      "if nothing flowed during the {:.1f} h of this log: a small load that never changes looks "
+      "the same",
+      hours);
+  return found;
 }
 
 struct Rest {
@@ -63,6 +106,9 @@ SensorFinding reading_at_rest(const measurement::Recording& r, const files::Cell
   const double band_a = std::max(constant_c * capacity_ah, noise_sigmas * cell.parameters.noise.current_a);
   if (std::none_of(r.current_a.begin(), r.current_a.end(),
                    [&](double a) { return std::abs(a) >= rest_c * capacity_ah; })) {
+    const bool rest_alone = std::none_of(r.current_a.begin(), r.current_a.end(),
+                                         [&](double a) { return std::abs(a) >= most_rest_c * capacity_ah; });
+    if (rest_alone) return reading_of_rest_alone(r, cell);
     found.why = "no reading is a load, so a small constant current looks like an offset";
     return found;
   }

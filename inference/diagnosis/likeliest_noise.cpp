@@ -72,7 +72,7 @@ LikeliestNoise search_noise(const NoiseModel& nominal, bool with_checks, const C
         first = search.count();
         for (std::size_t k = 0; k < steps.size(); ++k) {
           search.mark_tried(steps[k].noise);
-          if (costs[k] >= best.cost) continue;
+          if (!(costs[k] < best.cost)) continue;  // also ends where a cost is NaN
           best = {steps[k].noise, costs[k]};
           moved = true;
           first = steps[k].at + 1;

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <random>
@@ -159,6 +160,55 @@ TEST(SocColumn, SizesOfJumpsAndCapacitiesAreRight) {
       EXPECT_NEAR(column.events.front().size, planted, within) << name_of(fault) << ": " << log.recording.path;
     }
   }
+}
+
+/// Rows of a minute at more than the capacity an hour: each row's change is far from that of the file's capacity.
+TEST(SocColumn, ACountWithAnotherCapacityInRowsOfAMinuteIsNotATable) {
+  for (const double ratio : {0.7, 1.35}) {
+    std::vector<double> t, a, v, s;
+    double soc = 0.1, count = 0.1, rate = 1.6;
+    for (int k = 0; k < 120; ++k) {  // the charger ends slowly
+      if (rate > 0 && soc > 0.85) rate = std::max(0.05, 0.9 * rate);
+      if (k == 60) rate = -1.2;
+      if (soc < 0.15 && rate < 0) rate = -0.01;
+      soc += rate / 60;
+      count += ratio * rate / 60;
+      t.push_back(60.0 * k);
+      a.push_back(100 * rate);
+      v.push_back(rest_voltage(soc) + 0.04 * rate);
+      s.push_back(std::round(count * 1e4) / 1e4);
+    }
+    const SocColumn column = judge_soc_column(recording_of(t, a, v, s, "minutes"), 100);
+    ASSERT_EQ(column.events.size(), 1U) << ratio << ": " << sentence_of(column, 0, 100);
+    EXPECT_EQ(column.events.front().fault, SocFault::capacity) << sentence_of(column, 0, 100);
+    EXPECT_NEAR(column.events.front().size, 100 / ratio, 2);
+    EXPECT_NE(sentence_of(column, 0, 100).find(" Ah, not with 100 Ah;"), std::string::npos)
+        << sentence_of(column, 0, 100);
+    EXPECT_NE(sentence_of(column, 0, 100).find("or the capacity of 100 Ah is wrong"), std::string::npos);
+  }
+}
+
+/// 380 min; `first` and `second` are what the column shows before and after its only change.
+SocColumn one_change(double first, double second, double current_a) {
+  std::vector<double> t, a, v, s;
+  for (int k = 0; k < 380; ++k) {
+    t.push_back(60.0 * k);
+    a.push_back(current_a);
+    v.push_back(rest_voltage(0.5 + current_a * k / 6'000));
+    s.push_back(k < 200 ? first : second);
+  }
+  return judge_soc_column(recording_of(t, a, v, s, "one change"), 100);
+}
+
+TEST(SocColumn, ACoarseColumnWithASingleStepIsACountAndALeapOfAFineOneIsNot) {
+  const SocColumn coarse = one_change(0.5, 0.6, 3);
+  EXPECT_TRUE(coarse.is_count) << sentence_of(coarse, 0, 100);
+  EXPECT_EQ(coarse.resolution, 0.1);
+  const SocColumn fine = one_change(0.63, 0.83, 0.1);
+  ASSERT_FALSE(fine.is_count);
+  EXPECT_TRUE(std::any_of(fine.events.begin(), fine.events.end(), [](const SocEvent& e) {
+    return e.fault == SocFault::jump && e.time_s == 12'000 && std::abs(e.size - 0.2) < 0.01;
+  })) << sentence_of(fine, 0, 100);
 }
 
 TEST(SocColumn, AColumnThatStaysFullWhileTheChargerHoldsTheVoltageIsSound) {

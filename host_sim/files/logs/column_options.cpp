@@ -2,6 +2,8 @@
 
 #include <charconv>
 
+#include <fmt/format.h>
+
 #include "files/bad_input.hpp"
 #include "files/logs/table_layout.hpp"
 
@@ -60,6 +62,15 @@ std::optional<std::string> stated_unit(const std::vector<std::string>& unit_opti
     if (holds_for(target, column)) return unit;
   }
   return std::nullopt;
+}
+
+std::optional<Scale> stated_scale(const std::vector<std::string>& unit_options, const Target& column) {
+  const auto unit = stated_unit(unit_options, column);
+  if (!unit) return std::nullopt;
+  if (const auto scale = scale_of(column.quantity, *unit)) return scale;
+  throw BadInput("--unit", 1,
+                 fmt::format("{} is not a unit of {}, expected one of: {}", in_quotes(*unit), name_of(column),
+                             units_of(column.quantity)));
 }
 
 }  // namespace bms::files

@@ -30,4 +30,7 @@ std::vector<std::pair<std::size_t, std::size_t>> group_of(std::string_view patte
 /// The unit that the options state for this column; nothing if they state none.
 std::optional<std::string> stated_unit(const std::vector<std::string>& unit_options, const Target& column);
 
+/// Its scale. Throws BadInput if what they state is not a unit of the column.
+std::optional<Scale> stated_scale(const std::vector<std::string>& unit_options, const Target& column);
+
 }  // namespace bms::files

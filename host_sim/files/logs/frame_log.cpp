@@ -46,6 +46,8 @@ struct MeanReading {
 class FrameLog {
  public:
   FrameLog(std::string path, const ReadOptions& options) : path_(std::move(path)), options_(options) {
+    if (!options.steps.empty() || !options.cycles.empty())
+      throw BadInput(path_, 1, "a log of CAN frames has no steps and cycles, expected neither --steps nor --cycles");
     std::vector<std::string> mapped = options.map;
     if (options.dbc.empty()) {
       const std::vector<std::string> own =

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "files/logs/column_options.hpp"
 #include "files/logs/table_layout.hpp"
 
 namespace bms::files {
@@ -30,11 +31,8 @@ MappedSignal mapped_signal(const std::string& text, const std::vector<DbcSignal>
   MappedSignal mapped;
   mapped.signal = *found;
   mapped.target = *target;
-  std::string unit = found->unit;
-  for (const std::string& stated : options.unit) {
-    if (stated.starts_with(name_of(*target) + "=")) unit = stated.substr(stated.find('=') + 1);
-  }
-  if (const auto scale = scale_of(target->quantity, unit)) mapped.scale = *scale;
+  const auto stated = stated_scale(options.unit, *target);
+  mapped.scale = stated ? *stated : scale_of(target->quantity, found->unit).value_or(Scale{});
   mapped.multiplexors = multiplexors_of(*found, dbc, dbc_name);
   return mapped;
 }

@@ -115,10 +115,10 @@ bool FrameText::parse_busmaster(std::string_view line, TextFrame& frame) {
   }
   double time_s = 0;
   constexpr std::size_t bytes = 6;  // "time Rx channel id type length bytes"
-  const auto is_type = [&](std::string_view type) { return type == "s" || type == "x"; };  // not: sr, xr
-  if (words_.size() < bytes || !is_type(words_[4]) || !clock_of(words_[0], time_s)) return false;
+  if (words_.size() < bytes || !clock_of(words_[0], time_s)) return false;
   if (!relative_ && time_s + day_s_ < last_s_ - day_length_s / 2) day_s_ += day_length_s;
   last_s_ = relative_ ? last_s_ + time_s : time_s + day_s_;
+  if (words_[4] != "s" && words_[4] != "x") return false;  // sr, xr: remote frames, whose time counts
   frame.time_s = last_s_;
   frame.channel = words_[2];
   frame.long_id = words_[4] == "x";

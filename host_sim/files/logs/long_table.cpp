@@ -103,12 +103,12 @@ class LongTable {
   }
 
   measurement::Recording read_lines_of_console() {
+    console_ = true;
     std::string_view line;
     while (lines_.next(line)) {
       const auto reading = console_reading(line);
       if (!reading) continue;
-      unit_ = reading->unit;
-      receive({reading->entity, reading->state, reading->time});
+      receive({reading->entity, reading->state, reading->time}, reading->unit);
     }
     return finish();
   }
@@ -118,10 +118,11 @@ class LongTable {
     throw BadInput(path_, std::max<std::size_t>(1, lines_.number()), what + ", expected " + expected);
   }
 
-  void receive(const std::vector<std::string_view>& fields) {
+  /// unit: that the line states, or empty
+  void receive(const std::vector<std::string_view>& fields, std::string_view unit = {}) {
     const std::string entity(fields[at_.entity]);
     auto known = index_.find(entity);
-    if (known == index_.end()) known = index_.emplace(entity, series_of(entity)).first;
+    if (known == index_.end()) known = index_.emplace(entity, series_of(entity, unit)).first;
     if (!known->second) return;
     Series& series = series_[*known->second];
     const std::string_view state = fields[at_.state];
@@ -149,21 +150,13 @@ class LongTable {
   }
 
   /// What the user says about the unit, or the line.
-  std::optional<Scale> scale_of_series(const Target& target) const {
-    const auto stated = stated_unit(options_.unit, target);
-    if (!stated && unit_.empty()) return Scale{};
-    const std::string unit = stated ? *stated : std::string(unit_);
-    const auto scale = scale_of(target.quantity, unit);
-    if (!scale && stated) {
-      throw BadInput("--unit", 1,
-                     fmt::format("{} is not a unit of {}, expected one of: {}", in_quotes(unit), name_of(target),
-                                 units_of(target.quantity)));
-    }
-    return scale;
+  std::optional<Scale> scale_of_series(const Target& target, std::string_view unit) const {
+    if (const auto stated = stated_scale(options_.unit, target)) return stated;
+    return console_ ? scale_of(target.quantity, unit) : Scale{};
   }
 
   /// The series that this entity fills; nothing if it is not used.
-  std::optional<std::size_t> series_of(const std::string& entity) {
+  std::optional<std::size_t> series_of(const std::string& entity, std::string_view unit) {
     std::optional<Target> target;
     for (const std::string& text : options_.map) {
       const std::size_t equals = std::min(text.find('='), text.size());
@@ -176,7 +169,7 @@ class LongTable {
       refuse(fmt::format("{} and {} are both {}", in_quotes(s.entity), in_quotes(entity), name_of(*target)),
              fmt::format("--map {}=ENTITY with one of them, and so on", name_of(*target)));
     }
-    const auto scale = scale_of_series(*target);
+    const auto scale = scale_of_series(*target, unit);
     if (!scale) return std::nullopt;  // "max voltage cell" without a unit is a number of a cell
     series_.push_back({.entity = entity, .target = *target, .scale = *scale, .readings = {}});
     return series_.size() - 1;
@@ -237,15 +230,15 @@ class LongTable {
     std::vector<double> time_s = rows;
     for (double& t : time_s) t -= rows.front();
     r.time_s = std::move(time_s);
-    r.read_as = unit_.empty() ? "long table, a reading a row; time_s from " + in_quotes(layout_.headings[at_.time])
-                              : std::string("console of ESPHome");
+    r.read_as = console_ ? std::string("console of ESPHome")
+                         : "long table, a reading a row; time_s from " + in_quotes(layout_.headings[at_.time]);
     std::size_t named = 0;
     for (Series& s : series_) {
       put_column(r, s.target, column_of(s, rows));
       if (named++ < most_named) r.read_as += fmt::format("; {} from {}", name_of(s.target), in_quotes(s.entity));
     }
     if (named > most_named) r.read_as += fmt::format("; and {} more", named - most_named);
-    r.read_as += unit_.empty() ? "; in A, V and degrees C unless --unit states another" : "; in the units of its lines";
+    r.read_as += console_ ? "; in the units of its lines" : "; in A, V and degrees C unless --unit states another";
     r.read_as += "; readings within 1 s are one row, and are held until the next";
     const bool inverted = options_.sign == CurrentSign::discharge_positive;
     for (double& a : r.current_a.edit()) a = inverted ? -a : a;
@@ -278,7 +271,7 @@ class LongTable {
   std::map<std::string, std::optional<std::size_t>> index_;
   std::vector<Series> series_;
   std::size_t missing_ = 0;
-  std::string_view unit_;  ///< that the line states
+  bool console_ = false;  ///< its lines state their units
   double day_s_ = 0, last_clock_s_ = 0;
 };
 

@@ -351,6 +351,7 @@ class TableReader {
     }
     if (!layout_.own || layout_.decimal_comma || layout_.separator == '\t' || !lines_.encoding().empty())
       r.read_as = text_of(layout_, options_, lines_.encoding());
+    if (r.read_as.empty() && selection_.last_column()) r.read_as = "recording";
     r.read_as += selection_.text();
     join_row_groups(r);
     complete_pack(r, options_);

@@ -52,7 +52,8 @@ enum class Cause {
   current_offset,
   current_gain,
   all_capacity,
-  current_sign
+  current_sign,
+  current_silent  ///< reads 0 under load
 };
 
 /// Causes that are compared with one another for each cell.
@@ -68,7 +69,8 @@ const CauseText& text_of(Cause cause);
 
 /// Returns true if the readings are at fault, not the battery.
 constexpr bool is_of_data(Cause cause) {
-  return cause == Cause::late || cause == Cause::repeated || cause == Cause::staggered || cause == Cause::missing;
+  return cause == Cause::late || cause == Cause::repeated || cause == Cause::staggered || cause == Cause::missing ||
+         cause == Cause::current_silent;
 }
 
 /// Returns true for two causes of one cell whose effects are nearly alike. Together they would cancel at any size.

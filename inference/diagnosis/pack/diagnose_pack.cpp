@@ -9,6 +9,7 @@
 
 #include "diagnosis/pack/cell_fit.hpp"
 #include "diagnosis/pack/isolability.hpp"
+#include "diagnosis/pack/loose_wires.hpp"
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_texts.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
@@ -142,6 +143,26 @@ void accuse(State& s) {
   }
 }
 
+/// Puts in place of an accusation the one of its rivals that the last fit supports better.
+void exchange_for_rivals(State& s) {
+  const PackLikelihood likelihood = likelihood_of(s);
+  const std::size_t now = likelihood.last_checkpoint();
+  for (std::size_t k = 0; k < s.accused.size(); ++k) {
+    if (std::find(s.late.begin(), s.late.end(), s.accused[k]) != s.late.end()) continue;
+    std::vector<Accusation> others = s.accused;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(k));
+    Accusation best = s.accused[k];
+    for (const Accusation& rival : likelihood.rivals_of(s.accused[k])) {
+      if (std::find(others.begin(), others.end(), rival) != others.end()) continue;
+      std::vector<Accusation> instead = others;
+      instead.push_back(rival);
+      const bool possible = likelihood.is_possible(rival, likelihood.size(instead, rival, now));
+      if (possible && likelihood.gain(others, rival, now) > likelihood.gain(others, best, now)) best = rival;
+    }
+    s.accused[k] = best;
+  }
+}
+
 /// Accusations that the last fit no longer supports.
 void drop_unsupported(State& s) {
   const PackLikelihood likelihood = likelihood_of(s);
@@ -198,9 +219,10 @@ void fit_and_accuse(State& s) {
   }
   learn_noise(s);
   fit_all(s, true, done.noise, done.second);
-  // of held channels only the rows with a new reading count: they are few, and their moments are known. Rows far apart
-  // do not show whether the current was constant between them
-  const bool unknown_moment = s.noise.edge > limits.noise.unknown_edge || !steps_stand_alone(s.track, s.pack);
+  // Of held channels only the rows with a new reading count: they are few, and their moments are known. Rows far apart
+  // do not show whether the current was constant between them. The learned error at steps says whether the channels are
+  // read at other moments: where they are not, a current that changes in each row is as good as any.
+  const bool unknown_moment = s.noise.edge > limits.noise.unknown_edge;
   if (unknown_moment && !s.channels.are_mostly_held() && s.track.step_s <= limits.noise.longest_constant_s)
     leave_moving_rows_out(s);
   accuse(s);
@@ -209,6 +231,7 @@ void fit_and_accuse(State& s) {
   fit_all(s, false, done.second, done.third);
   accuse(s);
   fit_all(s, false, done.third, 1);
+  exchange_for_rivals(s);
   drop_unsupported(s);
 }
 
@@ -300,22 +323,9 @@ PackFinding finding_of(const State& s, const PackLikelihood& likelihood, const A
   return f;
 }
 
-Verdict verdict_of(const PackDiagnosis& d) {
-  std::size_t data = 0, ambiguous = 0;
-  for (const PackFinding& f : d.findings) {
-    if (is_of_data(f.cause)) ++data;
-    if (!f.rivals.empty() && f.rivals.front().probability > limits.ambiguous_from) ++ambiguous;
-  }
-  if (d.findings.size() > data) {
-    if (ambiguous > 0) return Verdict::ambiguous;
-    return d.findings.size() - data > 1 ? Verdict::causes : Verdict::cause;
-  }
-  if (data > 0) return Verdict::data_fault;
-  return d.unexplained.empty() ? Verdict::no_mismatch : Verdict::unknown;
-}
-
 /// Takes the errors of the current sensor out of current and state of charge, before cells are compared.
-std::optional<PackFinding> correct_current(State& s, const model::CellParameters<>& cell, std::string& text) {
+std::optional<PackFinding> correct_current(State& s, const model::CellParameters<>& cell, PackDiagnosis& d) {
+  std::string& text = d.current_sensor;
   set_neighbours(s.track, s.pack, usual_cells(s.pack), s.channels.are_mostly_held());
   SharedState shared = shared_state_of(s.track, s.pack);
   text = shared.not_tested;
@@ -324,7 +334,8 @@ std::optional<PackFinding> correct_current(State& s, const model::CellParameters
                      1e3 * shared.offset_sigma_a);
   s.pack.soc = std::move(shared.soc);
   for (double& a : s.pack.current_a) a = (1 - shared.gain) * a - shared.offset_a;
-  s.track = track_of(cell, s.pack, shared.resistance_factor);
+  s.track = track_of(cell, s.pack, shared.resistance_factor, shared.polarisation);
+  d.another_cell = shared.ocv_apart_v > limits.shared.another_cell * s.track.ocv_tolerance_v;
   return std::move(shared.finding);
 }
 
@@ -352,14 +363,16 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   d.duration_s = pack.time_s.back() - pack.time_s.front();
   const std::vector<PackFinding> of_voltmeter = check_pack_voltage(pack, s.track);
   s.progress(0, "channels");
+  const std::vector<LooseWire> loose = take_loose_wires(pack, limits.channels.step_c * s.track.capacity_ah);
   s.channels = check_channels(s.track, pack);
   for (const std::size_t c : s.channels.late(s.track.step_s)) s.late.push_back({Cause::late, c});
   s.accused = s.late;
   s.bad_sensors = check_thermistors(pack);
-  const std::optional<PackFinding> of_current = correct_current(s, cell, d.current_sensor);
+  const std::optional<PackFinding> of_current = correct_current(s, cell, d);
   fit_and_accuse(s);
   const PackLikelihood likelihood = likelihood_of(s);
   add_findings(s.channels, d.findings);
+  add_loose_wires(loose, pack.rows(), d.findings);
   if (s.track.uses_moving) s.staggered = staggered(s, likelihood);
   if (s.staggered) d.findings.push_back(*s.staggered);
   if (of_current) d.findings.push_back(*of_current);
@@ -376,15 +389,6 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   d.reference = reference_of(s);
   d.channels = s.channels;
   return d;
-}
-
-void conclude(PackDiagnosis& d) {
-  std::stable_partition(d.findings.begin(), d.findings.end(), [](const PackFinding& f) { return is_of_data(f.cause); });
-  for (PackFinding& f : d.findings) {
-    if (f.cause == Cause::repeated) f.because = confirmation_of(d.channels, f.cells);
-  }
-  d.verdict = verdict_of(d);
-  d.statement = statement_of(d);
 }
 
 }  // namespace bms::diagnosis::pack

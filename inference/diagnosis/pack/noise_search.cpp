@@ -30,7 +30,7 @@ NoiseModel search_noise(const NoiseModel& start, std::span<const double> time_s,
           tried.*part *= by;
           if (!is_allowed(tried, part, time_s)) continue;
           const double tried_cost = cost_of(tried);
-          if (tried_cost >= cost - limits.fit.converged) continue;
+          if (!(tried_cost < cost - limits.fit.converged)) continue;  // also ends where a cost is NaN
           cost = tried_cost;
           best = tried;
           moved = true;

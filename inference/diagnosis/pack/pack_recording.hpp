@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <string>
 #include <vector>
 
 namespace bms::diagnosis::pack {
@@ -18,6 +19,7 @@ struct PackRecording {
   std::vector<std::vector<double>> cell_v;    ///< one column for each cell
   std::vector<std::vector<double>> sensor_c;  ///< one column for each temperature sensor, spread evenly over the cells
   std::vector<double> pack_v;                 ///< empty: no voltmeter of the pack
+  std::string charge_unknown;                 ///< why the counted charge does not test the sensor; empty: it does
 
   std::size_t rows() const { return time_s.size(); }
   std::size_t cells() const { return cell_v.size(); }

@@ -74,6 +74,9 @@ constexpr std::array texts = {
               "The voltage of the cells falls when the reading rises. The state of charge goes the wrong way.",
               "Check the direction of the sensor and the sign in the logger. Positive current charges. The diagnosis "
               "used the reversed current."},
+    CauseText{"current_silent", "a current sensor that reads exactly 0 under load", "duration_s", "s",
+              "While the reading is 0, the voltages show steps of a load. The charge of that time is not counted.",
+              "Check the connection of the sensor and its reading. If it is read, look for loads that bypass it."},
 };
 
 /// Factor and unit for a reader.
@@ -129,6 +132,8 @@ std::string relation_of(const PackFinding& f) {
       return "between readings";
     case Cause::staggered:
       return "from the first to the last channel";
+    case Cause::current_silent:
+      return "in total";
     case Cause::current_sign:
       return "of the changes of the current show it";
     default:

@@ -133,10 +133,11 @@ struct PackThresholds {
 
   /// Of the current sensor.
   struct Sign {
-    std::size_t most_rows_late = 6;  ///< of the voltages
-    std::size_t least_changes = 30;  ///< of the current
-    double least_correlation = 0.3;  ///< of changes of voltage and current, against each other
-    double share_of_cells = 0.75;    ///< that must show it
+    std::size_t most_rows_late = 6;                   ///< of the voltages
+    std::array<std::size_t, 2> joined_rows = {3, 8};  ///< for slow changes
+    std::size_t least_changes = 30;                   ///< of the current
+    double least_correlation = 0.3;                   ///< of changes of voltage and current, against each other
+    double share_of_cells = 0.75;                     ///< that must show it
   } sign;
 
   struct Sensors {
@@ -164,7 +165,10 @@ struct PackThresholds {
     double start_soc = 0.05;                                 ///< standard deviation of the start
     double healthy_offset_c = 0.0012, healthy_gain = 0.004;  ///< of a current sensor
     double healthy_capacity = 0.01;                          ///< of all cells, against the cell file
-    double resistance = 0.3, polarisation = 0.1, per_k = 0.03, resistance_wave = 0.03;
+    double resistance = 1, polarisation = 1, per_k = 0.03, resistance_wave = 0.03;
+    /// The cells may be others than that of the file: errors of its OCV, over its tolerance, all as probable.
+    std::array<double, 5> ocv_factors = {1, 2, 4, 8, 16};
+    double another_cell = 3;    ///< RMS of these errors over the tolerance, from which on the file is of another cell
     double lead_rows = 1;       ///< standard deviation of the time between a row's mean current and its voltages
     double least_factor = 0.3;  ///< of the resistances against the cell file
     double fault_offset_c = 0.03, fault_gain = 0.1, fault_capacity = 0.15;
@@ -176,6 +180,20 @@ struct PackThresholds {
     double white_v = 0.0005, fast_v = 0.001, slow_v = 0.001;  ///< before the noise is learned
     int iterations = 8;
   } shared;
+
+  /// Of intermittent sense wires.
+  struct Wires {
+    double least_v = 0.005;    ///< of a leap: less is within what a slow channel and noise can do
+    double sigmas = 8;         ///< the same, of the usual changes from row to row
+    double single_cell = 0.5;  ///< change of the sum over the leap: it is 1 if one cell's channel alone leaps
+    double most_along = 0.15;  ///< by which sum or the next cells change with the leaps; balancing: by a third or more
+    double least_sigma_v = 0.0005;    ///< of a size
+    double same_level = 0.25;         ///< of the leap: such levels are one
+    double more_with_current = 0.25;  ///< share of the leaps, more than of all rows, in which the current steps
+    std::size_t least_rows = 30, least_steps = 8;
+    std::size_t rows = 5, rows_of_one_leap = 20;  ///< that are bad, at least: fewer are single odd readings
+    std::size_t named = 3;                        ///< stretches with their times
+  } wires;
 
   /// Of the residual of a fit, by the cell's state of charge.
   struct Misfit {

@@ -80,4 +80,19 @@ std::vector<double> warmer_than_at_start(const PackRecording& pack) {
   return warmer;
 }
 
+std::string reason_not_to_test(const Track& t, const PackRecording& pack) {
+  if (!pack.charge_unknown.empty()) return "Not tested: " + pack.charge_unknown + ".";
+  for (std::size_t k = 1; k < pack.rows(); ++k) {
+    if (pack.time_s[k] - pack.time_s[k - 1] > limits.shared.longest_gap_s)
+      return "Not tested: the recording has gaps, in which the charge is unknown.";
+  }
+  if (pack.time_s.back() - pack.time_s.front() < limits.shared.least_hours * 3'600)
+    return "Not tested: the recording is too short.";
+  if (t.step_s > limits.shared.longest_step_s) return "Not tested: the rows are too far apart.";
+  std::size_t finite = 0;
+  for (const double v : t.neighbours_v) finite += std::isfinite(v) ? 1 : 0;
+  if (2 * finite < pack.rows()) return "Not tested: most readings are missing or held.";
+  return "";
+}
+
 }  // namespace bms::diagnosis::pack

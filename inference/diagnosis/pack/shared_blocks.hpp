@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include "diagnosis/pack/pack_recording.hpp"
@@ -33,5 +34,8 @@ std::vector<double> counted_charge(const Track& track, const PackRecording& pack
 
 /// By row: mean of the temperature sensors minus that of the first row; 0 if unknown.
 std::vector<double> warmer_than_at_start(const PackRecording& pack);
+
+/// Why the mean of the cells does not test the current sensor; empty if it does.
+std::string reason_not_to_test(const Track& track, const PackRecording& pack);
 
 }  // namespace bms::diagnosis::pack

@@ -48,8 +48,8 @@ struct Problem {
 
 double or_zero(double value) { return std::isfinite(value) ? value : 0; }
 
-Unknowns healthy_of(const Track& t) {
-  Unknowns u = Unknowns::Constant(t.ocv_tolerance_v / std::numbers::sqrt2);
+Unknowns healthy_of(const Track& t, double ocv_factor) {
+  Unknowns u = Unknowns::Constant(ocv_factor * t.ocv_tolerance_v / std::numbers::sqrt2);
   u[start] = of_shared.start_soc;
   u[sensor_offset] = of_shared.healthy_offset_c * t.capacity_ah;
   u[sensor_gain] = of_shared.healthy_gain;
@@ -57,7 +57,7 @@ Unknowns healthy_of(const Track& t) {
   u[all_resistance] = of_shared.resistance;
   u[all_polarisation] = of_shared.polarisation;
   u[warmth] = of_shared.per_k;
-  u[level] = t.ocv_tolerance_v;
+  u[level] = ocv_factor * t.ocv_tolerance_v;
   u[lead] = of_shared.lead_rows;
   for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = of_shared.resistance_wave;
   return u;
@@ -223,6 +223,44 @@ NoiseModel noise_of(const Problem& p, const Around& a) {
   });
 }
 
+/// The best fit of all errors that the file's OCV may have; -2 log evidence decides, as their priors differ.
+Around best_fit(Problem& p) {
+  Around best;
+  double least = std::numeric_limits<double>::infinity(), best_factor = 1;
+  const Unknowns coarse = starting_point(p);
+  for (std::size_t n = 0; n < of_shared.ocv_factors.size(); n += 2) {
+    const double factor = of_shared.ocv_factors[n];
+    Unknowns wide = healthy_of(p.track, factor);
+    wide[sensor_offset] = of_shared.fault_offset_c * p.track.capacity_ah;
+    const NoiseModel noise{.white_v = of_shared.white_v, .fast_v = of_shared.fast_v, .slow_v = of_shared.slow_v};
+    for (const Unknowns& from : {Unknowns(Unknowns::Zero()), coarse}) {
+      const Around first = fit_from(p, from, wide, noise);
+      Around found = fit_from(p, first.u, wide, noise_of(p, first));
+      const Normal normal = normal_of(found, wide);
+      const double evidence =
+          found.cost + normal.ldlt().vectorD().array().abs().log().sum() + 2 * wide.array().log().sum();
+      if (evidence >= least) continue;
+      least = evidence;
+      best = std::move(found);
+      best_factor = factor;
+    }
+  }
+  p.healthy = healthy_of(p.track, best_factor);
+  return best;
+}
+
+/// RMS over the blocks of what the OCV of these cells differs from that of the file.
+double ocv_apart_v(const Problem& p, const Unknowns& u) {
+  measurement::MeanSquare apart;
+  for (const double soc : p.blocks.means(course_of(p, u).soc)) {
+    double v = u[level];
+    for (Eigen::Index w = 0; w < PackThresholds::Shared::ocv_waves; ++w)
+      v += u[wave_1 + w] * std::cos(std::numbers::pi * static_cast<double>(w + 1) * soc);
+    apart.add(v);
+  }
+  return apart.root();
+}
+
 /// By row, on the resistances of the cell file.
 std::vector<double> factor_of(const Problem& p, const Unknowns& u, const std::vector<double>& soc) {
   std::vector<double> factor;
@@ -236,20 +274,6 @@ std::vector<double> factor_of(const Problem& p, const Unknowns& u, const std::ve
   return factor;
 }
 
-std::string reason_not_to_test(const Track& t, const PackRecording& pack) {
-  for (std::size_t k = 1; k < pack.rows(); ++k) {
-    if (pack.time_s[k] - pack.time_s[k - 1] > of_shared.longest_gap_s)
-      return "Not tested: the recording has gaps, in which the charge is unknown.";
-  }
-  if (pack.time_s.back() - pack.time_s.front() < of_shared.least_hours * 3'600)
-    return "Not tested: the recording is too short.";
-  if (t.step_s > of_shared.longest_step_s) return "Not tested: the rows are too far apart.";
-  std::size_t finite = 0;
-  for (const double v : t.neighbours_v) finite += std::isfinite(v) ? 1 : 0;
-  if (2 * finite < pack.rows()) return "Not tested: most readings are missing or held.";
-  return "";
-}
-
 struct Hypothesis {
   Eigen::Index unknown;
   Cause cause;
@@ -257,10 +281,22 @@ struct Hypothesis {
   double gain = 0;  ///< log likelihood ratio to a healthy sensor
 };
 
-double gain_of(const Around& a, const Unknowns& healthy, Eigen::Index unknown, double fault) {
-  Unknowns prior = healthy;
-  prior[unknown] = std::hypot(prior[unknown], fault);
-  return log_marginal(a.information, a.with_data, prior) - log_marginal(a.information, a.with_data, healthy);
+/// Log probability of the data if this unknown has a fault of that size: the mean over how wrong the file's OCV is.
+double evidence_of(const Around& a, const Track& t, Eigen::Index unknown, double fault) {
+  std::vector<double> logs;
+  for (const double factor : of_shared.ocv_factors) {
+    Unknowns prior = healthy_of(t, factor);
+    prior[unknown] = std::hypot(prior[unknown], fault);
+    logs.push_back(log_marginal(a.information, a.with_data, prior));
+  }
+  const double most = *std::max_element(logs.begin(), logs.end());
+  double sum = 0;
+  for (const double l : logs) sum += std::exp(l - most);
+  return most + std::log(sum / static_cast<double>(logs.size()));
+}
+
+double gain_of(const Around& a, const Track& t, Eigen::Index unknown, double fault) {
+  return evidence_of(a, t, unknown, fault) - evidence_of(a, t, unknown, 0);
 }
 
 PackFinding finding_for(const Around& a, const Unknowns& healthy, const Hypothesis& h) {
@@ -284,7 +320,7 @@ std::optional<PackFinding> judge(const Problem& p, const Around& a) {
       {sensor_gain, Cause::current_gain, of_shared.fault_gain, of_shared.least_gain, 0},
       {all_capacity, Cause::all_capacity, of_shared.fault_capacity, of_shared.least_capacity, 0},
   }};
-  for (Hypothesis& h : list) h.gain = gain_of(a, p.healthy, h.unknown, h.fault);
+  for (Hypothesis& h : list) h.gain = gain_of(a, p.track, h.unknown, h.fault);
   std::stable_sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.gain > y.gain; });
   const Hypothesis& best = list.front();
   const double needed = std::log(static_cast<double>(list.size()) / limits.fault_prior) + limits.least_odds;
@@ -336,24 +372,18 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
   SharedState s;
   s.not_tested = reason_not_to_test(track, pack);
   if (!s.not_tested.empty()) return s;
-  const Problem p{.track = track,
-                  .pack = pack,
-                  .charge = counted_charge(track, pack),
-                  .blocks = Blocks(track, pack),
-                  .healthy = healthy_of(track)};
-  Unknowns wide = p.healthy;
-  wide[sensor_offset] = of_shared.fault_offset_c * track.capacity_ah;
-  NoiseModel noise{.white_v = of_shared.white_v, .fast_v = of_shared.fast_v, .slow_v = of_shared.slow_v};
-  Around best;
-  for (const Unknowns& from : {Unknowns(Unknowns::Zero()), starting_point(p)}) {
-    const Around first = fit_from(p, from, wide, noise);
-    Around found = fit_from(p, first.u, wide, noise_of(p, first));
-    if (found.cost < best.cost) best = std::move(found);
-  }
-  noise = best.noise;
+  Problem p{.track = track,
+            .pack = pack,
+            .charge = counted_charge(track, pack),
+            .blocks = Blocks(track, pack),
+            .healthy = {}};
+  Around best = best_fit(p);
   s.finding = judge(p, best);
+  s.ocv_apart_v = ocv_apart_v(p, best.u);
+  // what the sensor shows follows from the file's OCV: that of another cell says nothing of it
+  if (s.ocv_apart_v > of_shared.another_cell * track.ocv_tolerance_v) s.finding.reset();
   if (s.finding) s.finding->after_s = named_after_s(p, best, s.finding->cause);
-  if (!s.finding) best = fit_from(p, best.u, p.healthy, noise);
+  if (!s.finding) best = fit_from(p, best.u, p.healthy, best.noise);
   s.soc = course_of(p, best.u).soc;
   s.resistance_factor = factor_of(p, best.u, s.soc);
   s.offset_a = best.u[sensor_offset];
@@ -362,6 +392,7 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
                   {sensor_offset, Cause::current_offset, of_shared.fault_offset_c * track.capacity_ah, 0, 0})
           .sigma;
   s.gain = best.u[sensor_gain];
+  s.polarisation = best.u[all_polarisation];
   return s;
 }
 

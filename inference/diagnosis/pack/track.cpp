@@ -95,7 +95,8 @@ RcVoltage rc_voltage_of(const Track& track, const PackRecording& pack, double ln
   return p;
 }
 
-Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor) {
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor,
+               double polarisation) {
   const PreparedCell prepared = model::prepare<double, model::max_intervals>(cell);
   Track t;
   t.cell = prepared;
@@ -111,7 +112,7 @@ Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, c
     const auto at = model::look_up(t.cell, t.soc[k], interval);
     const double f = factor.empty() ? 1 : factor[k];
     t.r0_by_row_ohm.push_back(f * at.r0_ohm);
-    t.r1_by_row_ohm.push_back(f * at.r1_ohm);
+    t.r1_by_row_ohm.push_back(std::max(limits.shared.least_factor, f + polarisation) * at.r1_ohm);
     t.tau_s.push_back(at.r1_ohm * at.c1_f);
     t.model_v.push_back(at.ocv_v + f * at.r0_ohm * current_a);
     t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));

@@ -49,7 +49,9 @@ double usual_step_s(const PackRecording& pack);
 
 /// Without neighbours_v, smooth_v, instant_a, slow_a and moving. factor: by row, on the resistances of the cell file;
 /// empty: 1.
-Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor = {});
+/// polarisation: what is added to the factor for R1.
+Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, const std::vector<double>& factor = {},
+               double polarisation = 0);
 
 /// Sets neighbours_v, smooth_v, instant_a, slow_a and moving: the mean of these cells. Rows in which less than half of
 /// them have a reading have no value. by_voltmeter: there, the pack's voltmeter less its usual difference to the cells;

@@ -95,6 +95,30 @@ TEST(PackCurrent, RecognisesAReversedSignAlsoOfLateChannels) {
   }
 }
 
+/// Rows of 30 s, a load of 25 s on and 25 s off: mean current and voltage are against each other a row later.
+TEST(PackCurrent, ALoadThatIsSwitchedWithinARowHasNoReversedSign) {
+  constexpr std::size_t row_s = 30;
+  plant::Random random(3);
+  std::vector<double> each_second;
+  for (double left = 0, now_a = 0; each_second.size() < 60'000; --left) {
+    if (left <= 0) {
+      now_a = now_a == 0 ? 50 : 0;
+      left += 20 + 10 * random.uniform();
+    }
+    each_second.push_back(now_a);
+  }
+  Load load;
+  std::vector<double> v;
+  for (std::size_t k = 0; (k + 1) * row_s <= each_second.size(); ++k) {
+    double sum = 0;
+    for (std::size_t s = k * row_s; s < (k + 1) * row_s; ++s) sum += each_second[s];
+    load.current_a.push_back(sum / static_cast<double>(row_s));
+    v.push_back(3.3 + 0.001 * each_second[(k + 1) * row_s - 1]);
+  }
+  load.voltage_v.assign(8, v);
+  EXPECT_FALSE(dp::reversed_current(load.current_a, load.voltage_v, 1));
+}
+
 TEST(PackCurrent, SaysNothingOfASignWithoutChangesOfTheCurrent) {
   Load load = load_with(0);
   for (double& a : load.current_a) a = -10;

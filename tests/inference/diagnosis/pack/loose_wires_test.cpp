@@ -1,0 +1,138 @@
+// Sense wires with a bad contact, among cells that differ, balancers and single odd readings.
+#include "diagnosis/pack/loose_wires.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <random>
+
+namespace bms {
+namespace {
+
+namespace dp = diagnosis::pack;
+
+constexpr std::size_t rows = 2'000;
+
+/// Cells of other resistances and charges under steps of the current; `wire` changes what the channels of a row read.
+dp::PackRecording pack_of(std::size_t cells, unsigned seed,
+                          const std::function<void(std::size_t row, std::vector<double>& v)>& wire) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0, 1);
+  dp::PackRecording pack;
+  pack.cell_v.resize(cells);
+  std::vector<double> ohm, apart;
+  for (std::size_t c = 0; c < cells; ++c) {
+    ohm.push_back(0.001 * (1 + 0.1 * noise(random)));
+    apart.push_back(0.004 * noise(random));
+  }
+  double current_a = 0;
+  for (std::size_t k = 0; k < rows; ++k) {
+    if (k % 17 == 0) current_a = 40 * noise(random);
+    pack.time_s.push_back(2.0 * static_cast<double>(k));
+    pack.current_a.push_back(current_a);
+    std::vector<double> v;
+    for (std::size_t c = 0; c < cells; ++c)  // cells empty at other rates
+      v.push_back(3.3 + apart[c] * (1 + static_cast<double>(k) / rows) + ohm[c] * current_a + 5e-4 * noise(random));
+    wire(k, v);
+    for (std::size_t c = 0; c < cells; ++c) pack.cell_v[c].push_back(std::round(v[c] * 1e3) / 1e3);
+  }
+  return pack;
+}
+
+std::vector<dp::LooseWire> wires_in(dp::PackRecording& pack) { return dp::take_loose_wires(pack, 5); }
+
+TEST(LooseWires, AreNamedWithTheirSizeAndTheirRowsAreLeftOut) {
+  unsigned seed = 1;
+  for (const std::size_t cells : {3U, 4U, 8U, 24U}) {
+    for (const double size_v : {0.02, 0.06, 1.15}) {
+      const std::size_t at = ++seed % (cells - 1);
+      const auto is_bad = [](std::size_t k) { return k > 300 && k % 97 < 30; };
+      dp::PackRecording pack = pack_of(cells, seed, [&](std::size_t k, std::vector<double>& v) {
+        if (!is_bad(k)) return;
+        v[at] += size_v;
+        v[at + 1] -= size_v;
+      });
+      const auto wires = wires_in(pack);
+      ASSERT_EQ(wires.size(), 1U) << cells << " cells, " << size_v << " V";
+      EXPECT_EQ(wires[0].cell, at);
+      EXPECT_EQ(wires[0].finding.cause, dp::Cause::sense_wire);
+      EXPECT_NEAR(wires[0].finding.value, size_v, 0.02 * size_v + 0.001);
+      std::size_t kept = 0, lost = 0;
+      for (std::size_t k = 0; k < rows; ++k) {
+        if (is_bad(k)) kept += std::isfinite(pack.cell_v[at][k]) ? 1 : 0;
+        if (!is_bad(k)) lost += std::isfinite(pack.cell_v[at][k]) ? 0 : 1;
+      }
+      EXPECT_LE(kept, 2U) << "bad readings that stay";
+      EXPECT_LE(lost, 2U) << "good readings that are gone";
+    }
+  }
+}
+
+TEST(LooseWires, AWireThatComesOffAndStaysOffIsOneLeap) {
+  dp::PackRecording pack = pack_of(8, 3, [](std::size_t k, std::vector<double>& v) {
+    if (k < 1'500) return;
+    v[2] += 0.3;
+    v[3] -= 0.3;
+  });
+  const auto wires = wires_in(pack);
+  ASSERT_EQ(wires.size(), 1U);
+  EXPECT_EQ(wires[0].rows, 500U);
+  EXPECT_NE(wires[0].finding.because.find("from 3000 to 3998 s"), std::string::npos) << wires[0].finding.because;
+}
+
+/// The sum changes with a balancing current, and so do other cells.
+TEST(LooseWires, AreNotSeenInHealthyPacksBalancersAndSingleOddReadings) {
+  const auto none = [](std::size_t, std::vector<double>&) {};
+  const auto one_cell = [](std::size_t k, std::vector<double>& v) {
+    if (k % 60 >= 30) return;
+    v[1] += 0.006;
+    v[2] -= 0.012;
+    if (v.size() > 3) v[3] += 0.006;
+  };
+  const auto every_second = [](std::size_t k, std::vector<double>& v) {
+    for (std::size_t c = 0; c < v.size() && k % 60 < 30; ++c) v[c] += c % 2 == 0 ? -0.015 : 0.015;
+  };
+  const auto odd_readings = [](std::size_t k, std::vector<double>& v) {
+    if (k % 500 == 7) v[1] = 0.5;
+    if (k == 900) {
+      v[0] += 0.4;
+      v[1] -= 0.37;
+    }
+  };
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    // a large joint, and currents that step within a row: the voltage shows the new current, the mean both
+    dp::PackRecording joint = pack_of(8, seed, none);
+    for (std::size_t k = rows - 1; k > 0; --k) {
+      joint.cell_v[4][k] += 0.02 * joint.current_a[k];
+      const double share = 0.1 * static_cast<double>(k % 10);
+      joint.current_a[k] = share * joint.current_a[k] + (1 - share) * joint.current_a[k - 1];
+    }
+    EXPECT_TRUE(wires_in(joint).empty()) << seed;
+    const std::size_t cells = 4 + seed;
+    dp::PackRecording healthy = pack_of(cells, seed, none), single = pack_of(cells, seed, one_cell),
+                      second = pack_of(cells, seed, every_second), odd = pack_of(cells, seed, odd_readings);
+    EXPECT_TRUE(wires_in(healthy).empty()) << seed;
+    EXPECT_TRUE(wires_in(single).empty()) << seed;
+    EXPECT_TRUE(wires_in(second).empty()) << seed;
+    EXPECT_TRUE(wires_in(odd).empty()) << seed;
+  }
+}
+
+TEST(LooseWires, ReplaceTheMissingReadingsOfTheirRowsOnly) {
+  dp::PackFinding missing;
+  missing.cause = dp::Cause::missing;
+  missing.cell = 1;
+  missing.value = 0.3;
+  dp::LooseWire wire{.cell = 0, .rows = 300, .finding = {}};
+  std::vector<dp::PackFinding> findings = {missing};
+  dp::add_loose_wires({wire}, 1'000, findings);
+  EXPECT_EQ(findings.size(), 1U) << "all that is missing was removed";
+  missing.value = 0.9;
+  findings = {missing};
+  dp::add_loose_wires({wire}, 1'000, findings);
+  EXPECT_EQ(findings.size(), 2U) << "most is missing for another reason";
+}
+
+}  // namespace
+}  // namespace bms
