@@ -31,7 +31,7 @@ struct Options {
   std::uint64_t seed = 1;
   std::size_t first = 0;
   std::optional<std::size_t> count;
-  bool no_baselines = false;
+  bool no_baselines = false, no_experiments = false;
   std::string kind;
   std::string json, readme;
 };
@@ -133,7 +133,10 @@ void run(const Options& options) {
   bms::numerics::in_parallel(count, [&](std::size_t k) {
     const truth::Case c = truth::make_case(split, options.seed, options.first + k);
     if (!options.kind.empty() && options.kind != truth::name_of(c.answer.kind)) return;
-    for (std::size_t m = 0; m < columns.size(); ++m) columns[m].outcomes[k] = bms::benchmark::methods[m].run(c);
+    for (std::size_t m = 0; m < columns.size(); ++m) {
+      const bool alone = m == 0 && options.no_experiments;
+      columns[m].outcomes[k] = alone ? bms::benchmark::run_case_alone(c) : bms::benchmark::methods[m].run(c);
+    }
     const std::scoped_lock lock(printing);
     fmt::print("{}", line_of(options.first + k, columns.front().outcomes[k]));
     std::fflush(stdout);
@@ -162,6 +165,8 @@ int main(int argc, char** argv) {
   app.add_option("--kind", o.kind, "run only cases of this kind")
       ->check(CLI::IsMember(std::vector<std::string>(truth::case_kinds.begin(), truth::case_kinds.end())));
   app.add_flag("--no-baselines", o.no_baselines, "run only the diagnosis");
+  app.add_flag("--no-experiments", o.no_experiments,
+               "run none of the experiments that an ambiguous diagnosis proposes");
   app.add_option("--json", o.json, "write every outcome to FILE")->type_name("FILE");
   app.add_option("--readme", o.readme,
                  "write the tables to FILE, between '<!-- figures: SPLIT -->' and '<!-- end of figures -->'")

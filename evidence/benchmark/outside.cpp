@@ -45,7 +45,7 @@ void run(const Options& options) {
   bms::numerics::in_parallel(options.cases, [&](std::size_t k) {
     const truth::Case c = truth::make_outside_case(split, options.seed, options.first + k);
     if (c.answer.ids.front().find(options.only) == std::string::npos || c.answer.strength < 2) return;
-    outcomes[k] = bms::benchmark::run_case(c);
+    outcomes[k] = bms::benchmark::run_case_with_experiments(c);
     const std::scoped_lock lock(printing);
     fmt::print("{}", line_of(options.first + k, outcomes[k]));
     std::fflush(stdout);

@@ -91,7 +91,7 @@ void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& s
   o.answer = c.answer;
 }
 
-Outcome run_case(const truth::Case& c) {
+Outcome run_case(const truth::Case& c, bool with_experiments) {
   const model::CellParameters<> cell = cell_of(c.cell);
   const diagnosis::PreparedRecording recording =
       record_of(c.recording, c.given_initial_soc, cell.tolerance.initial_soc);
@@ -119,7 +119,7 @@ Outcome run_case(const truth::Case& c) {
         diagnosis::predict(d.cell, added, record_of(c.holdout, c.holdout_initial_soc, cell.tolerance.initial_soc));
   }
   compare(o, c, d.spans, holdout_v);
-  o.next = follow_up(c, cell, recording, d);
+  if (with_experiments) o.next = follow_up(c, cell, recording, d);
   return o;
 }
 

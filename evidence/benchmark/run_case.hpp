@@ -40,7 +40,9 @@ diagnosis::PreparedRecording record_of(const truth::Series& s, double initial_so
 void compare(Outcome& o, const truth::Case& c, const std::vector<model::Span>& spans,
              const std::vector<double>& holdout_v);
 
-/// The diagnosis of this project.
-Outcome run_case(const truth::Case& c);
+/// The diagnosis of this project, of an ambiguous one also the experiments that it proposes.
+Outcome run_case(const truth::Case& c, bool with_experiments);
+inline Outcome run_case_with_experiments(const truth::Case& c) { return run_case(c, true); }
+inline Outcome run_case_alone(const truth::Case& c) { return run_case(c, false); }
 
 }  // namespace bms::benchmark

@@ -93,6 +93,7 @@ struct Errors {
   double file_v = 0;       ///< on the recordings
   double tolerated_v = 0;  ///< that noise, the tolerance of the OCV and healthy recordings explain
   double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
+  double certain_v = 0;    ///< above it something is wrong even where no healthy recording could be compared
 };
 
 /// covered: share of the recordings where healthy ones were.
@@ -101,7 +102,8 @@ Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const 
                times_there = std::max(times, error_factor(covered, options.false_alarm_rate)),
                tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), likelihood.cell().tolerance.ocv_v);
   return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, times * healthy_v),
-          std::max(thresholds.decision.gross_v, times_there * healthy_v)};
+          std::max(thresholds.decision.gross_v, times_there * healthy_v),
+          thresholds.decision.certain_times * std::max(tolerated_v, healthy_v)};
 }
 
 Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contributions& contributed,
@@ -112,7 +114,8 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
   const bool no_blocks = d.healthy && d.healthy->blocks == 0;
   const bool comparable =
       std::none_of(d.withheld.begin(), d.withheld.end(), [&](const Withheld& w) { return no_blocks || w.only_place; });
-  if (!adequacy.found && comparable && errors.file_v > errors.gross_v) return Verdict::unknown;
+  const bool gross = errors.file_v > errors.certain_v || (comparable && errors.file_v > errors.gross_v);
+  if (!adequacy.found && gross) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
   if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
       contributed.remaining_rmse_v > errors.tolerated_v)

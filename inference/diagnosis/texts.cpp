@@ -183,12 +183,17 @@ std::string unknown_text(const Diagnosis& d, const RecordingFacts& facts) {
   std::string text =
       fmt::format("The recording differs from the model by {} in a way that none of the known causes explains.",
                   millivolts(facts.error_v));
-  const auto cause =
-      std::find_if(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.mechanism != no_mechanism; });
-  if (cause != d.withheld.end())
-    text = fmt::format("The recording differs from the model by {}. {} is not named as its cause: {}.",
-                       millivolts(facts.error_v), capitalised(std::string(text_of_mechanism(cause->mechanism).name)),
-                       reason_of(*cause, d));
+  std::vector<std::string> possible;
+  const Withheld* first = nullptr;
+  for (const Withheld& w : d.withheld) {
+    if (w.mechanism == no_mechanism) continue;
+    possible.emplace_back(text_of_mechanism(w.mechanism).name);
+    if (first == nullptr) first = &w;
+  }
+  if (first != nullptr)
+    text = fmt::format("The recording differs from the model by {}. {} could cause it and {} not named: {}.",
+                       millivolts(facts.error_v), capitalised(joined(possible, "and")),
+                       possible.size() > 1 ? "are" : "is", reason_of(*first, d));
   if (!where.empty()) text += " Most of the difference lies " + where + ".";
   if (d.law) {
     text += fmt::format(" It acts on {}.", name_of_law(*d.law));

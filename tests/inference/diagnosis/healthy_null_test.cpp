@@ -65,7 +65,7 @@ TEST(HealthyNull, AnUnknownCauseNextToAWithheldOneNamesThatOne) {
   w.healthy.hours_needed = 3;
   d.healthy = HealthyBasis{.hours = 0.5};
   d.withheld = {w};
-  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("polarisation is not named as its cause: 0.5 h of healthy"));
+  EXPECT_THAT(statement(d, {}), ::testing::HasSubstr("polarisation could cause it and is not named: 0.5 h of healthy"));
   EXPECT_THAT(statement(d, {}), ::testing::Not(::testing::HasSubstr("none of the known causes")));
 }
 
@@ -384,6 +384,18 @@ TEST(DiagnoseWithHealthy, WithoutAnyUsableBlockNothingIsBlamed) {
   EXPECT_EQ(d.verdict, Verdict::not_testable);
   EXPECT_FALSE(d.withheld.empty());
   EXPECT_TRUE(d.limits.empty()) << "no cause could be named";
+}
+
+TEST(DiagnoseWithHealthy, WithoutAnyUsableBlockALargeErrorIsSaidWithItsSizeAndWhatCouldCauseIt) {
+  const PreparedRecording r = test::recorded(test::drive(0.5, 204), 0.7, 204, not_in_the_model(0.15));
+  Options options;
+  options.healthy.known = true;
+  Diagnosis d = diagnose(test::table9(), {}, {r}, options);
+  EXPECT_EQ(d.verdict, Verdict::unknown);
+  ASSERT_FALSE(d.withheld.empty());
+  describe(d, test::table9(), {r});
+  EXPECT_THAT(d.statement, testing::ContainsRegex("differs from the model by [0-9.]+ mV"));
+  EXPECT_THAT(d.statement, testing::HasSubstr("could cause it and"));
 }
 
 TEST(DiagnoseWithHealthy, AGoodModelStaysWithoutMismatch) {
