@@ -20,7 +20,8 @@
 //   16 can_stop              identifier    1 to 0x7FF                                          of the bus
 //   17 canopen_node          node          the build's: only shown                             of the bus
 //   18 canopen_charger       node          the build's: only shown                             of the bus
-//   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor
+//   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor,
+//                                          4 key, 8 charger plug, 16 coil supply, 32 interlock, 64 crash sensor
 //
 // The initial values are those of the build. `tightened_plan.hpp` says what the limits do, and proves at compile time
 // that every corner of their ranges gives a consistent table. Those of the bus are used from the next start on.
@@ -58,7 +59,8 @@ enum class Parameter : std::uint8_t {
 };
 inline constexpr std::size_t parameter_count = 19;
 
-inline constexpr std::int32_t auxiliary_contacts_fitted = 1, second_current_fitted = 2;
+/// Those of a truck begin with first_truck_input, in the order of hal::TruckInput.
+inline constexpr std::int32_t auxiliary_contacts_fitted = 1, second_current_fitted = 2, first_truck_input = 4;
 
 struct Range {
   std::int32_t lowest = 0, highest = 0, initial = 0;
