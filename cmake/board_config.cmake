@@ -1,7 +1,9 @@
 # bms_board_config(NAME FOLDER SOURCE TEXT [CELLS N] [SAMPLE_PERIOD_S S] [CURRENT_RANGE_A A] [FIXED_POINT true|false]
 #                  [DC_LINK true|false] [TRUCK_STATED true|false] [PRECHARGE_S S] [CLOSING_A A] [CLOSING_OHM OHM]
 #                  [VEHICLE_PROFILE none|cia418|j1939|elcon] [CANOPEN_NODE N] [CANOPEN_CHARGER N]
-#                  [CAN_BIT_RATE R] [CAN_BASE ID] [CAN_STOP ID] [PARAMETERS true|false])
+#                  [CAN_BIT_RATE R] [CAN_BASE ID] [CAN_STOP ID] [PARAMETERS true|false]
+#                  [INPUTS BITS] [OUTPUTS BITS] [CLOSES_BY_INPUTS true|false] [INSULATION absent|pwm|iso175]
+#                  [SECOND_CURRENT true|false] [TRUCK_SIDE true|false] [BLEED_OHM OHM])
 #
 # Writes FOLDER/board_config.hpp: all that the C++ code knows about a board and about the build options. NAME becomes
 # an interface library with FOLDER in its include path. The values below are those of the host.
@@ -22,9 +24,17 @@ function(bms_board_config name folder)
   set(bms_config_CAN_BASE 0x180)
   set(bms_config_CAN_STOP 0x0A0)
   set(bms_config_PARAMETERS true)
+  set(bms_config_INPUTS 0)
+  set(bms_config_OUTPUTS 7)
+  set(bms_config_CLOSES_BY_INPUTS false)
+  set(bms_config_SECOND_CURRENT true)
+  set(bms_config_TRUCK_SIDE true)
+  set(bms_config_BLEED_OHM 33)
+  set(bms_config_INSULATION absent)
   set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK TRUCK_STATED PRECHARGE_S
     CLOSING_A CLOSING_OHM VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER CAN_BIT_RATE CAN_BASE CAN_STOP
-    PARAMETERS)
+    PARAMETERS INPUTS OUTPUTS CLOSES_BY_INPUTS INSULATION
+    SECOND_CURRENT TRUCK_SIDE BLEED_OHM)
   cmake_parse_arguments(arg "" "SOURCE;${settings}" "" ${ARGN})
   set(bms_config_source ${arg_SOURCE})
   foreach(setting ${settings})
@@ -35,4 +45,17 @@ function(bms_board_config name folder)
   configure_file(${PROJECT_SOURCE_DIR}/cmake/board_config.hpp.in ${folder}/board_config.hpp @ONLY)
   add_library(${name} INTERFACE)
   target_include_directories(${name} INTERFACE ${folder})
+endfunction()
+
+# bms_bits(OUT SETTING KNOWN WANTED): one bit for each wanted word, by its place in the list of known ones.
+function(bms_bits out setting known wanted)
+  set(bits 0)
+  foreach(word ${wanted})
+    list(FIND known ${word} place)
+    if(place EQUAL -1)
+      message(FATAL_ERROR "${setting} has ${word}, expected words of: ${known}")
+    endif()
+    math(EXPR bits "${bits} | (1 << ${place})")
+  endforeach()
+  set(${out} ${bits} PARENT_SCOPE)
 endfunction()

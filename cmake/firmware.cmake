@@ -24,6 +24,11 @@
 #   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
 #   BMS_PRECHARGE_S, BMS_CLOSING_A, BMS_CLOSING_OHM  of the truck, see boards/README.md; also as -DBMS_PRECHARGE_S=S
 #   BMS_AUXILIARY_CONTACTS  of the main contactors: stm32f4 (PB14, PB15), or absent
+#   BMS_INPUTS, BMS_OUTPUTS  of the truck: words of "key charger_plug coil_supply interlock crash" and of
+#                  "heater fan soc_lamp"; also as -DBMS_INPUTS="coil_supply;crash"
+#   BMS_INSULATION  monitor: absent, pwm (PA6) or iso175 (CAN)
+#   BMS_SECOND_CURRENT  hall (PA1), or absent
+#   BMS_CLOSES_BY_INPUTS  true: key and charger plug close the contactors without authority (docs/safety/threats.md)
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (firmware/can/messages.md): cia418 for a CANopen charger,
 # with the nodes BMS_CANOPEN_NODE and BMS_CANOPEN_CHARGER; elcon for a charger of 0x1806E5F4; or j1939.
@@ -39,11 +44,37 @@
 # IMAGE_shared compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
-set(of_pack_and_truck CELLS PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
-foreach(value ${of_pack_and_truck})
+set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
+set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS)
+foreach(value ${of_pack_and_truck} ${of_inputs})
   set(wanted_${value} ${BMS_${value}})
 endforeach()
 include(${root}/boards/${BMS_BOARD}/board.cmake)
+foreach(value ${of_inputs})
+  if(wanted_${value})
+    set(BMS_${value} ${wanted_${value}})
+  endif()
+endforeach()
+foreach(value INSULATION SECOND_CURRENT)
+  if(NOT BMS_${value})
+    set(BMS_${value} absent)
+  endif()
+endforeach()
+if(NOT BMS_CLOSES_BY_INPUTS)
+  set(BMS_CLOSES_BY_INPUTS false)
+endif()
+set(second_current_possible true)
+if(BMS_SECOND_CURRENT STREQUAL "absent")
+  set(second_current_possible false)
+endif()
+list(REMOVE_ITEM BMS_INPUTS none)
+list(REMOVE_ITEM BMS_OUTPUTS none)
+set(truck_side false)
+if(BMS_INPUTS OR NOT BMS_INSULATION STREQUAL "absent")
+  set(truck_side true)
+endif()
+bms_bits(input_bits BMS_INPUTS "key;charger_plug;coil_supply;interlock;crash" "${BMS_INPUTS}")
+bms_bits(output_bits BMS_OUTPUTS "heater;fan;soc_lamp" "${BMS_OUTPUTS}")
 set(of_truck)
 foreach(value ${of_pack_and_truck})
   if(wanted_${value})
@@ -91,7 +122,8 @@ bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.c
   ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
-  PARAMETERS ${BMS_PARAMETERS})
+  PARAMETERS ${BMS_PARAMETERS} INPUTS ${input_bits} OUTPUTS ${output_bits} INSULATION ${BMS_INSULATION}
+  CLOSES_BY_INPUTS ${BMS_CLOSES_BY_INPUTS} SECOND_CURRENT ${second_current_possible} TRUCK_SIDE ${truck_side})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
@@ -205,18 +237,32 @@ set(auxiliary_contacts ${absent_hal}/auxiliary_contacts.cpp)
 if(DEFINED BMS_AUXILIARY_CONTACTS)
   set(auxiliary_contacts ${hal}/${BMS_AUXILIARY_CONTACTS}/auxiliary_contacts.cpp)
 endif()
+set(truck_pins ${absent_hal}/truck_inputs.cpp)
+if(BMS_INPUTS OR BMS_OUTPUTS)
+  set(truck_pins ${chip}/truck_pins.cpp)
+endif()
+set(insulation ${absent_hal}/insulation.cpp)
+if(BMS_INSULATION STREQUAL "pwm")
+  set(insulation ${chip}/insulation_pwm.cpp)
+endif()
+set(second_current ${absent_hal}/second_current.cpp)
+if(BMS_SECOND_CURRENT STREQUAL "hall")
+  set(second_current ${hal}/adc/second_current.cpp)
+endif()
+set(no_truck ${absent_hal}/truck_inputs.cpp ${absent_hal}/insulation.cpp)
 set(can_slcan ${hal}/slcan/can.cpp ${chip}/uart.cpp)
 set(can_bxcan ${chip}/bxcan.cpp)
 set(no_chain ${absent_hal}/calibration.cpp ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp
-  ${absent_hal}/second_current.cpp)  # for a board without a measuring chain
+  ${absent_hal}/second_current.cpp ${no_truck})  # for a board without a measuring chain
 set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
-  ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp)
+  ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_truck})
 # The settings of the chip's own protections follow the cell file.
 set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
   ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
-  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts})
+  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts}
+  ${second_current} ${truck_pins} ${insulation})
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself

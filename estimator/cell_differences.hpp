@@ -48,6 +48,9 @@ class CellDifference {
     covariance_.set_diagonal({Variance(initial_resistance_sigma * initial_resistance_sigma), Variance(sigma * sigma)});
   }
 
+  /// Charge of this cell alone, through its balancing resistor.
+  constexpr void shift(const Soc& by) { soc_ = soc_ + by; }
+
   /// moved: change of the mean SOC since the last call.
   constexpr void predict(const Soc& moved) {
     // the error keeps its sign until the current turns, so standard deviations add: (sigma + d)^2 - sigma^2
@@ -132,6 +135,7 @@ class CellDifferences {
   }
 
   constexpr void begin(std::size_t k, const Soc& soc, const Soc& sigma) { difference_[k].begin(soc, sigma); }
+  constexpr void shift(std::size_t k, const Soc& by) { difference_[k].shift(by); }
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return difference_[k]; }
 
  private:

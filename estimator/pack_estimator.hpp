@@ -120,6 +120,9 @@ class PackCells {
     differences_.begin(k, soc, sigma);
   }
 
+  /// Adds a charge of cell k alone, which the current of the pack does not show: that of its balancing resistor.
+  constexpr void shift(std::size_t k, const arithmetic::Soc<S>& by) { differences_.shift(k, by); }
+
   constexpr const CellDifference<S>& operator[](std::size_t k) const { return differences_[k]; }
 
  private:

@@ -26,15 +26,14 @@
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
+#include "firmware/truck_side.hpp"
 #include "hal/board_state.hpp"
 #include "hal/calendar.hpp"
 #include "hal/clock.hpp"
 #include "hal/estimate_record.hpp"
 #include "hal/power_path.hpp"
 #include "hal/requests.hpp"
-#include "hal/second_current.hpp"
 #include "hal/second_line.hpp"
-#include "hal/supply.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
@@ -82,12 +81,23 @@ class Application {
     if constexpr (has_parameters) board_.parameters_lost = Board::parameters().lost();
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = requested_.power.active(vehicle_profile_.charger(pack.time_us), pack.time_us);
+    protection::ExternalInputs inputs;
+    const Losses losses = truck_.read(fitted_inputs(), pack.time_us, board_, inputs);
+    const ChargerState charger = with_plug(vehicle_profile_.charger(pack.time_us), board_.truck);
+    inputs.request = requested_.power.active(charger, pack.time_us,
+                                             hal::closes_by_inputs && board_.truck.is_on(hal::TruckInput::key));
     Board::update_condition(condition_, estimator_, mean, estimate,
-                            hal::can_listening() || request != protection::Request::none);
+                            hal::can_listening() || inputs.request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
     observe(pack, estimate);
-    protect(pack, estimate, request);
+    protect(pack, estimate, inputs, losses);
+    truck_.judge_sensors(mean, inputs.second_current_ua, protection_.decision(), board_);
+    for (std::size_t k = 0; cells > 1 && k < cells; ++k) {
+      if (const std::int32_t ppm = protection_.take_bled_ppm(k); ppm > 0) [[unlikely]]
+        cells_.shift(k, arithmetic::from_micro<arithmetic::Soc<typename Estimator::Scalar>>(-ppm));
+    }
+    truck_.switch_outputs(pack.temperature_cdegc, known_soc_ppb(estimate), charger.present, pack.time_us,
+                          protection_.decision(), Board::plan(), board_);
     access_.drive.renew(pack.time_us, access_.source);
     publish(pack, mean, estimate);
     store_decision();
@@ -148,7 +158,8 @@ class Application {
     persistence_.observe(now);
   }
 
-  void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::Request request) {
+  void protect(const measurement::PackSample<cells>& pack, const Result& estimate, protection::ExternalInputs& inputs,
+               const Losses& losses) {
     protection::PackEstimate<cells> known;
     const bool is_number = messages::is_number(estimate);
     if ((estimate.flags & estimator::not_started) == 0 && is_number) {
@@ -164,23 +175,9 @@ class Application {
         known.cell_sigma_ppb[k] = cells > 1 ? messages::ppb(cells_[k].soc_sigma()) : 0;
       }
     }
-    protection::ExternalInputs inputs;
-    inputs.request = request;
     inputs.clear = std::exchange(requested_.clear, protection::Clear::none);
     if (board_.cell_file_changed && inputs.clear != protection::Clear::none) [[unlikely]]
       accept_cell_file();
-    const hal::LinkVoltages link = hal::link_voltages();
-    inputs.link_plus_uv = link.plus_uv;
-    inputs.link_minus_uv = link.minus_uv;
-    const hal::AuxiliaryContacts contacts = hal::auxiliary_contacts();
-    if (fitted(parameters::auxiliary_contacts_fitted)) {
-      inputs.auxiliary = {contacts.fitted, contacts.main_plus_closed, contacts.main_minus_closed};
-      inputs.contact_lost = contacts.losses != 0;
-    }
-    inputs.second_line = hal::second_line_trips();
-    if (fitted(parameters::second_current_fitted)) inputs.second_current_ua = hal::second_current_ua();
-    const std::uint32_t supply_falls = hal::supply_falls();
-    inputs.supply_dip = board_.state.supply_low || supply_falls != 0;
     inputs.board_fault = !is_number || (estimate.flags & estimator::not_a_number) != 0 || board_.unfit() ||
                          parameters_unfit(inputs.clear) || latched_faults_.endangered() ||
                          (first_ && (hal::reset_cause() == hal::ResetCause::watchdog || hal::last_fault()));
@@ -190,10 +187,7 @@ class Application {
     const auto& decision = protection_.update(pack, known, inputs);
     hal::power_path_set({decision.outputs.main_plus, decision.outputs.main_minus, decision.outputs.precharge,
                          decision.outputs.charge_enable, decision.bleed});
-    if (!decision.outputs.any_closed()) {
-      hal::supply_acknowledge(supply_falls);
-      hal::acknowledge_contact_losses(contacts.losses);
-    }
+    if (!decision.outputs.any_closed()) losses.acknowledge();
   }
 
   /// After the messages, because a write of flash takes milliseconds.
@@ -236,7 +230,9 @@ class Application {
       ++k;
       if (!handle_session(frame, now_us) && !handle_command(frame, now_us)) vehicle_profile_.receive(frame, now_us);
     }
-    for (int k = 0; k < max_requests && hal::next_network_frame(frame); ++k) vehicle_profile_.receive(frame, now_us);
+    for (int k = 0; k < max_requests && hal::next_network_frame(frame); ++k) {
+      if (!truck_.receive(frame, now_us)) vehicle_profile_.receive(frame, now_us);
+    }
   }
 
   void handle_power(const can::Frame& frame, std::uint64_t now_us) {
@@ -350,11 +346,14 @@ class Application {
     return false;
   }
 
-  /// Returns false for an input that this truck does not have, as its parameters say.
-  static bool fitted(std::int32_t input) {
-    if constexpr (has_parameters)
-      return (at(Board::parameters().active(), parameters::Parameter::inputs_fitted) & input) != 0;
-    return true;
+  /// Inputs that this truck has, as its parameters say.
+  static std::int32_t fitted_inputs() {
+    if constexpr (has_parameters) return at(Board::parameters().active(), parameters::Parameter::inputs_fitted);
+    return 0x7FFF'FFFF;
+  }
+
+  static std::int32_t known_soc_ppb(const Result& estimate) {
+    return (estimate.flags & estimator::not_started) == 0 ? messages::ppb(estimate.soc) : measurement::no_reading;
   }
 
   /// An erase stops the core for half a second, so it happens only while all contactors are open.
@@ -372,6 +371,7 @@ class Application {
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
   float capacity_ah_ = 0;
+  TruckSide truck_;
   Commands commands_;
   struct NoParameters {};
   [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;

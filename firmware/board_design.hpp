@@ -16,6 +16,7 @@ constexpr protection::PackDesign board_design(const model::Limits& limits, doubl
           .closing_loop_ohm = hal::closing_ohm,
           .dc_link = hal::has_dc_link,
           .precharge_time_constant_s = hal::precharge_s,
+          .bleed_ohm = hal::bleed_ohm,
           .current_range_a = hal::current_range_a};
 }
 

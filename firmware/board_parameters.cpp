@@ -13,7 +13,8 @@ constexpr parameters::BuildDefaults build{
     .canopen_node = hal::canopen_node,
     .canopen_charger = hal::canopen_charger,
     .shunt_nohm = 100'000,
-    .inputs_fitted = parameters::auxiliary_contacts_fitted | parameters::second_current_fitted};
+    .inputs_fitted = parameters::auxiliary_contacts_fitted | parameters::second_current_fitted |
+                     static_cast<std::int32_t>(hal::fitted_inputs) * parameters::first_truck_input};
 constexpr parameters::Ranges ranges = parameters::ranges_of(board_pack, build);
 constexpr auto sample_us = static_cast<std::uint32_t>(1e6 * hal::sample_period_s + 0.5);
 constexpr protection::ProtectionPlan plan_of_build = protection::protection_plan(board_pack);

@@ -2,14 +2,15 @@
 //
 //   source    asks by                                                     asks for nothing by
 //   truck     Command request 1 or 2, DriveRequest (firmware/access.hpp)  request 0, or silence of five seconds
-//   charger   its state: Cia418Profile::charger()                         any other state, or no heartbeat
+//   charger   its state: Cia418Profile::charger(), the plug               any other state, or no heartbeat
+//   key       its input, if the build closes by inputs                    off
 //
 //   1. A stop (frame Stop) ends the request of every source until that source asks again: it has to ask for nothing
 //      first. A source that only goes on is not followed, nor is anything that arrives with the same sample.
 //      Of a request 0 and a request for power with the same sample the order is not known (hal/request_queue.hpp):
 //      request 0 wins, and the truck, which repeats its request, is followed with the next one.
 //   2. A truck does not drive while a charger is present (EN 1175): then neither is followed.
-//   3. The truck's request, then the charger's.
+//   3. The truck's request or that of its key, then the charger's.
 //
 // Request 0 ends the request of the truck and of no other source, because a parked truck repeats it every second.
 #pragma once
@@ -56,9 +57,11 @@ class PowerRequests {
   }
 
   /// The request to follow. Call with every sample.
-  constexpr Request active(const ChargerState& now, std::uint64_t now_us) {
+  constexpr Request active(const ChargerState& now, std::uint64_t now_us, bool key_on = false) {
     if (!now.asks) stopped_[charger] = false;
-    const Request of_truck = stopped_[truck] ? Request::none : truck_request(now_us);
+    if (!key_on) stopped_[key] = false;
+    Request of_truck = stopped_[truck] ? Request::none : truck_request(now_us);
+    if (of_truck == Request::none && key_on && !stopped_[key]) of_truck = Request::drive;
     if (of_truck == Request::drive && now.present) return Request::none;
     return of_truck == Request::none && now.asks && !stopped_[charger] ? Request::charge : of_truck;
   }
@@ -66,7 +69,7 @@ class PowerRequests {
   constexpr bool operator==(const PowerRequests&) const = default;
 
  private:
-  enum Source : std::size_t { truck, charger, sources };
+  enum Source : std::size_t { truck, charger, key, sources };
 
   /// What the truck asks for, followed or not.
   constexpr Request truck_request(std::uint64_t now_us) const {

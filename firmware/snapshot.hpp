@@ -9,6 +9,8 @@
 #include "estimator/condition.hpp"
 #include "estimator/pack_estimator.hpp"
 #include "hal/board_state.hpp"
+#include "hal/insulation.hpp"
+#include "hal/truck_inputs.hpp"
 #include "measurement/pack_sample.hpp"
 #include "protection/protection.hpp"
 #include "storage/persistence.hpp"
@@ -18,8 +20,12 @@ namespace bms::firmware {
 /// Self-diagnosis of the board.
 struct BoardStatus {
   hal::BoardState state;
-  bool cell_file_changed = false;       ///< the stored data belong to another cell file
-  bool parameters_lost = false;         ///< the stored parameters cannot be read (firmware/parameters/)
+  bool cell_file_changed = false;  ///< the stored data belong to another cell file
+  bool parameters_lost = false;    ///< the stored parameters cannot be read (firmware/parameters/)
+  hal::TruckInputs truck;
+  hal::Insulation insulation;
+  std::uint32_t truck_outputs = 0;  ///< bits of hal::TruckOutput
+  std::uint32_t wrong_current_sensor = can::TruckInputs::wrong_current_sensor_none;
   std::uint32_t longest_sample_us = 0;  ///< longest processing time of a sample so far; 0: not known yet
 
   constexpr bool unfit() const { return state.unfit() || cell_file_changed; }

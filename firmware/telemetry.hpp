@@ -18,6 +18,7 @@
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_data.hpp"
+#include "firmware/truck_message.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
@@ -57,6 +58,7 @@ class Telemetry {
       return m;
     });
     published_alarming_ = now.board.alarming();
+    publish_truck(now.board);
     if (now.stored_part) [[unlikely]]
       stored_data_.send(*now.stored_part, now.persistence, static_cast<std::uint32_t>(now.capacity_ah * 1e6F));
     if (now.log_samples) log(now.mean);
@@ -147,6 +149,18 @@ class Telemetry {
     published_outputs_ = d.outputs;
   }
 
+  void publish_truck(const BoardStatus& board) {
+    if constexpr (!hal::may_have_truck) return;
+    if (board.truck.fitted == 0 && !board.insulation.fitted &&
+        board.wrong_current_sensor == can::TruckInputs::wrong_current_sensor_none)
+      return;
+    const std::uint32_t inputs = board.truck.fitted << 16 | board.truck.on;
+    send_if_due_or_changed<can::TruckInputs>(inputs != published_inputs_, [&] {
+      return messages::truck_inputs(board.truck, board.insulation, board.truck_outputs, board.wrong_current_sensor);
+    });
+    published_inputs_ = inputs;
+  }
+
   void publish_cells(const Snapshot<Estimator, Cells>& now) {
     static_assert(Cells <= 24, "further cells have no message");
     send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(now.pack); });
@@ -202,7 +216,7 @@ class Telemetry {
   StoredData stored_data_;
   estimator::EstimateHash hash_;
   protection::FaultSet published_faults_ = 0;
-  std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0;
+  std::uint32_t now_us_ = 0, published_ = 0, published_trips_ = 0, published_inputs_ = 0;
   protection::ContactorState published_state_ = protection::ContactorState::off;
   protection::Outputs published_outputs_;
   std::uint16_t samples_ = 0;

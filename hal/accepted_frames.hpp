@@ -43,18 +43,28 @@ inline constexpr auto request_and_sample_ids = [] {
   return ids;
 }();
 
-/// 29-bit identifiers of chargers that the battery receives: those with the bits of `id` where `mask` has ones.
+/// 29-bit identifiers of chargers and of an insulation monitor that the battery receives: those with the bits of `id`
+/// where `mask` has ones.
 struct LongId {
   std::uint32_t id, mask;
   constexpr bool matches(std::uint32_t other) const { return ((id ^ other) & mask) == 0; }
 };
-inline constexpr auto long_ids = [] {
+inline constexpr std::uint32_t iso175_frame_id = 0x18FF'01F4;
+inline constexpr auto charger_long_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::elcon)
     return std::array<LongId, 1>{{{0x18FF'50E5, 0x1FFF'FFFF}}};
   else if constexpr (vehicle_profile == VehicleProfile::j1939)  // address claimed; request for a parameter group
     return std::array<LongId, 2>{{{0x00EE'0000, 0x00FF'0000}, {0x00EA'0000, 0x00FF'0000}}};
   else
     return std::array<LongId, 0>{};
+}();
+
+inline constexpr auto long_ids = [] {
+  constexpr bool monitored = insulation_monitor == InsulationMonitor::iso175;
+  std::array<LongId, charger_long_ids.size() + (monitored ? 1 : 0)> ids{};
+  std::ranges::copy(charger_long_ids, ids.begin());
+  if constexpr (monitored) ids.back() = {iso175_frame_id, 0x1FFF'FFFF};
+  return ids;
 }();
 
 /// The identifiers that this image receives: one of the lists above, by the source of its samples. Back ends: absent/

@@ -12,6 +12,8 @@ namespace bms::measurement {
 
 inline constexpr std::int32_t no_reading = std::numeric_limits<std::int32_t>::min();
 inline constexpr std::int16_t no_temperature = std::numeric_limits<std::int16_t>::min();
+/// No temperature either: the sensor is shorted, which a second line takes for the highest one.
+inline constexpr std::int16_t shorted_thermistor = std::numeric_limits<std::int16_t>::max();
 
 /// One set of measurements. Any field may be wrong: the estimator checks them, the caller need not.
 struct Sample {

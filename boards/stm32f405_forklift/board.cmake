@@ -12,6 +12,7 @@ set(BMS_CURRENT_RANGE_A 2000)  # 200 mV at 0.1 mohm
 set(BMS_PRECHARGE_S 0.5)  # 50 ohm x 10 mF
 set(BMS_CLOSING_A 600)
 set(BMS_CLOSING_OHM 0.015)
+set(BMS_BLEED_OHM 33)  # an external switch for each cell (README.md, balancing)
 set(BMS_EMULATED OFF)
 set(BMS_LOOP_BOARD netduinoplus2)
 set(BMS_CAN bxcan)
@@ -19,6 +20,11 @@ set(BMS_CAN_BIT_RATE 250000)  # another one: -DBMS_CAN_BIT_RATE=500000
 set(BMS_PARAMETERS true)
 set(BMS_SAMPLES bq76952)
 set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors have none
+# Of the truck; what it does not have is left out of the list (boards/README.md).
+set(BMS_INPUTS charger_plug coil_supply interlock crash)
+set(BMS_OUTPUTS heater fan soc_lamp)
+set(BMS_SECOND_CURRENT hall)  # absent: a truck without a Hall sensor
+set(BMS_INSULATION absent)  # pwm: Bender IR155; iso175: Bender iso175, over CAN
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a
 # sample [ms] (tests/firmware/board_budget.hpp).
 set(BMS_BUDGET_FLASH 98304)  # the chip has 1 MiB

@@ -20,7 +20,8 @@
 //   16 can_stop              identifier    1 to 0x7FF                                          of the bus
 //   17 canopen_node          node          the build's: only shown                             of the bus
 //   18 canopen_charger       node          the build's: only shown                             of the bus
-//   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor
+//   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor,
+//                                          4 key, 8 charger plug, 16 coil supply, 32 interlock, 64 crash sensor
 //
 // The initial values are those of the build. `tightened_plan.hpp` says what the limits do, and proves at compile time
 // that every corner of their ranges gives a consistent table. Those of the bus are used from the next start on.
@@ -58,7 +59,8 @@ enum class Parameter : std::uint8_t {
 };
 inline constexpr std::size_t parameter_count = 19;
 
-inline constexpr std::int32_t auxiliary_contacts_fitted = 1, second_current_fitted = 2;
+/// Those of a truck begin with first_truck_input, in the order of hal::TruckInput.
+inline constexpr std::int32_t auxiliary_contacts_fitted = 1, second_current_fitted = 2, first_truck_input = 4;
 
 struct Range {
   std::int32_t lowest = 0, highest = 0, initial = 0;
@@ -138,18 +140,33 @@ constexpr bool possible(Parameter p, std::int32_t value, const Ranges& ranges) {
   return true;
 }
 
+/// Identifiers of the update of the firmware (firmware/boot/update_server.hpp), which do not move.
+inline constexpr std::int32_t update_request = 0x7B0, update_response = 0x7B8;
+
 /// Returns true if no two messages of the battery have the same identifier, and Stop wins the arbitration. 0x300 to
 /// 0x33F are those of samples (hal/sample_frames.hpp); the others are those of a CANopen node
-/// (firmware/cia418_profile.hpp).
+/// (firmware/cia418_profile.hpp) and of the update.
 constexpr bool identifiers_are_unique(const Values& values) {
   const std::int32_t base = at(values, Parameter::can_base), stop = at(values, Parameter::can_stop),
                      node = at(values, Parameter::canopen_node), charger = at(values, Parameter::canopen_charger);
   if (node == charger || base == 0x300 || stop >= base) return false;
   const auto own = [&](std::int32_t id) { return id >= base && id < base + base_step; };
   if (own(stop) || (stop >= 0x300 && stop < 0x340)) return false;
-  const std::int32_t of_canopen[] = {0x580 + node,    0x600 + node,    0x700 + node,   0x700 + charger,
-                                     0x200 + charger, 0x300 + charger, 0x400 + charger};
-  return std::ranges::none_of(of_canopen, [&](std::int32_t id) { return id == stop || own(id); });
+  const std::int32_t of_others[] = {0x580 + node,    0x600 + node,    0x700 + node,   0x700 + charger, 0x200 + charger,
+                                    0x300 + charger, 0x400 + charger, update_request, update_response};
+  return std::ranges::none_of(of_others, [&](std::int32_t id) { return id == stop || own(id); });
+}
+
+/// Bit rate and identifiers of a possible set in one word: 4 bits of 125 kbit/s, 5 bits of base_step, 11 bits of Stop.
+constexpr std::int32_t bus_setting(const Values& values) {
+  return at(values, Parameter::can_bit_rate) / 125 | at(values, Parameter::can_base) / base_step << 4 |
+         at(values, Parameter::can_stop) << 9;
+}
+/// The values may be impossible ones if the word is not of bus_setting().
+constexpr void set_bus(Values& values, std::int32_t setting) {
+  at(values, Parameter::can_bit_rate) = 125 * (setting & 0xF);
+  at(values, Parameter::can_base) = base_step * (setting >> 4 & 0x1F);
+  at(values, Parameter::can_stop) = setting >> 9 & 0x7FF;
 }
 
 /// Returns true if all values are possible, also together.

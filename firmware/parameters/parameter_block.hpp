@@ -28,7 +28,9 @@ enum class BlockState : std::uint8_t { initial, stored, clamped, lost };
 
 class ParameterBlock {
  public:
-  static constexpr std::uint16_t revision_key = 4;  ///< of the settings (firmware/stored_state.hpp has the others)
+  // Keys of the settings (firmware/stored_state.hpp has the others).
+  static constexpr std::uint16_t revision_key = 4;
+  static constexpr std::uint16_t bus_key = 5;  ///< bus_setting() of the active set
 
   /// ranges: must outlive this object.
   constexpr explicit ParameterBlock(const Ranges& ranges) : ranges_(&ranges), active_(initial_values(ranges)) {}
@@ -41,11 +43,12 @@ class ParameterBlock {
     if (!newest || (known != 0 && newer(known, newest->revision))) {
       state_ = known != 0 ? BlockState::lost : BlockState::initial;
       revision_ = known;
+      if (lost()) adopt_bus(persistence.settings().get(bus_key));
       return;
     }
     adopt(*newest);
     if (!first || !second || first->revision != second->revision) store(persistence);
-    if (known != revision_) persistence.set(revision_key, revision_);
+    note(persistence);
   }
 
   const Ranges& ranges() const { return *ranges_; }
@@ -80,18 +83,33 @@ class ParameterBlock {
       return false;
     }
     state_ = BlockState::stored;
-    persistence.set(revision_key, revision_);
+    note(persistence);
     return true;
   }
-  /// A workshop accepts the values of the build after a loss.
+  /// A workshop accepts the values of the build after a loss. Those of the bus stay.
   void accept(storage::Persistence& persistence) {
     if (!lost()) return;
-    state_ = BlockState::initial;
+    state_ = BlockState::stored;
     store(persistence);
+    note(persistence);
   }
 
  private:
   static constexpr bool newer(std::uint16_t a, std::uint16_t b) { return static_cast<std::int16_t>(a - b) > 0; }
+
+  /// What is known of the set outside its copies. The bus first: a loss of power in between leaves the old revision,
+  /// with which the copies are not lost.
+  void note(storage::Persistence& persistence) const {
+    const auto& settings = persistence.settings();
+    if (settings.get(bus_key) != bus_setting(active_)) persistence.set(bus_key, bus_setting(active_));
+    if (settings.get(revision_key) != revision_) persistence.set(revision_key, revision_);
+  }
+  void adopt_bus(std::optional<std::int32_t> setting) {
+    Values values = active_;
+    if (!setting) return;
+    set_bus(values, *setting);
+    if (possible(values, *ranges_)) active_ = values;
+  }
 
   static std::optional<ParametersRecord> load(storage::Persistence& persistence, storage::Kind kind) {
     std::array<std::uint8_t, storage::max_payload_bytes> bytes;

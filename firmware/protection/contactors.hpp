@@ -36,6 +36,9 @@
 //   not closed  with both outputs on a pole differs from the pack by a sixteenth of it, for 0.3 s (table). At once: by
 //               a quarter of it, by an auxiliary contact, or by its interrupt. Also main- that does not close.
 //
+// No supply of the coils (an input that may be fitted) is a state and no fault: the contactors have opened, and close
+// again with the next new request.
+//
 // A pack without a DC link (PackDesign::dc_link) closes from off to drive or charge; only its current shows a weld.
 //
 // Times are durations that stop at their limit, so nothing wraps. Integers only.
@@ -79,6 +82,7 @@ struct ContactorInput {
   bool open = false, open_now = false;  ///< a fault with this reaction is active
   bool charge_forbidden = false, discharge_forbidden = false;
   bool contact_lost = false;  ///< a main contact has opened by itself since the last step, perhaps only for a moment
+  bool coils_dead = false;    ///< the coils have no supply, so nothing closes: by an emergency stop
   std::int32_t current_ua = measurement::no_reading, pack_uv = measurement::no_reading,
                link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
   AuxiliaryContacts auxiliary = {};
@@ -152,7 +156,7 @@ class Contactors {
     const ContactorState s = state();
     const bool may_close = s == ContactorState::self_test || s == ContactorState::precharge ||
                            s == ContactorState::drive || s == ContactorState::charge || s == ContactorState::unloading;
-    if (in.open_now && may_close) return enter(ContactorState::opening);
+    if ((in.open_now || in.coils_dead) && may_close) return enter(ContactorState::opening);
     if (may_close && contact_opened(in, link)) return fail_to_close();
     switch (s) {
       case ContactorState::off:
@@ -223,6 +227,7 @@ class Contactors {
   constexpr void in_off(const ContactorInput& in, const DcLink& link) {
     check_opened(in, link);
     if (in.open || in.open_now) return enter(ContactorState::safe);
+    if (in.coils_dead) last_request_ = in.request;  // the release of an emergency stop must not start the truck
     if (in.request == Request::none || in.request == last_request_ || blocked(in) || events_.welded) return;
     last_request_ = in.request;
     if (plan_->dc_link)

@@ -10,6 +10,12 @@
 //   allowed   the larger of the published current and of that which cell and faults permit now. The published one
 //             decreases by 1C per second, and it is 0 after a request has ended, while a load is lowered
 //
+// The row that forbids asks a truck to end its current, before the one that opens. While the contactors are open that
+// is answered, and the discharge so far asks no more: its row would keep an obeying truck from driving for the 28
+// minutes in which the leak empties e, and the bound above does not need it, because e itself stays. A charge goes on
+// being forbidden, because that strands nobody, and a charger that does not obey would open under its current every two
+// minutes.
+//
 // A current that is not derated at all adds nothing: the continuous limit has the overload integral I2t
 // (pack_quantities.hpp), which carries pulses above it. The leak goes on while the contactors are open. Integers only.
 #pragma once
@@ -39,15 +45,16 @@ class ExcessCharge {
  public:
   constexpr explicit ExcessCharge(const ExcessPlan& plan) : plan_(&plan) {}
 
-  /// published, permitted: of the sample before. step_us: time since the last call.
+  /// published, permitted: of the sample before. opened: all contactors are. step_us: time since the last call.
   constexpr void update(std::int32_t current_ua, const AllowedCurrent& published, const AllowedCurrent& permitted,
-                        std::uint32_t step_us, Quantities& q) {
+                        bool opened, std::uint32_t step_us, Quantities& q) {
     if (current_ua == measurement::no_reading) return;
     add(charge_us_, current_ua, std::max(published.charge_ua, permitted.charge_ua), plan_->charge_max_ua, step_us);
     add(discharge_us_, -current_ua, std::max(published.discharge_ua, permitted.discharge_ua), plan_->discharge_max_ua,
         step_us);
     at(q, Quantity::charge_excess_us) = charge_us_;
-    at(q, Quantity::discharge_excess_us) = discharge_us_;
+    answered_us_ = opened ? discharge_us_ : std::min(answered_us_, discharge_us_);
+    at(q, Quantity::discharge_excess_us) = discharge_us_ - answered_us_;
     at(q, Quantity::largest_excess_us) = std::max(charge_us_, discharge_us_);
   }
 
@@ -67,6 +74,7 @@ class ExcessCharge {
 
   const ExcessPlan* plan_;
   std::int32_t charge_us_ = 0, discharge_us_ = 0;
+  std::int32_t answered_us_ = 0;  ///< of discharge_us_, by an opening
 };
 
 }  // namespace bms::protection

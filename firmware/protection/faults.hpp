@@ -54,12 +54,18 @@ enum class Fault : std::uint8_t {
   discharge_limit_exceeded,
   limit_not_obeyed,
   supply_dip,
+  thermistor_shorted,
+  second_current_missing,
+  interlock_open,
+  crash,
+  insulation_low,
+  insulation_unknown,
 };
 
 /// One bit for each fault: bit k is Fault k.
 using FaultSet = std::uint64_t;
 
-inline constexpr std::size_t fault_count = 42;
+inline constexpr std::size_t fault_count = 48;
 static_assert(fault_count <= 62, "signal Faults.FirstCause has six bits and a value for not known");
 inline constexpr std::uint8_t no_fault = 0xFF;
 
@@ -104,7 +110,13 @@ inline constexpr std::array<const char*, fault_count> fault_names = {"cell overv
                                                                      "charge limit exceeded",
                                                                      "discharge limit exceeded",
                                                                      "limit not obeyed",
-                                                                     "supply dip"};
+                                                                     "supply dip",
+                                                                     "thermistor shorted",
+                                                                     "second current missing",
+                                                                     "interlock open",
+                                                                     "crash",
+                                                                     "insulation low",
+                                                                     "insulation unknown"};
 
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
 constexpr FaultSet bit(Fault f) { return FaultSet{1} << static_cast<unsigned>(f); }

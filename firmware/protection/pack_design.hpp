@@ -59,6 +59,10 @@ constexpr std::int32_t in_centi(double value) {
 constexpr std::int32_t magnitude(std::int32_t value) { return std::max(value, -value); }
 constexpr std::uint32_t in_us(double seconds) { return static_cast<std::uint32_t>(seconds * 1e6 + 0.5); }
 
+/// 100 ohm per volt of the full pack (ISO 6469-3, DC), in ohm.
+constexpr std::int32_t least_insulation_ohm(const PackDesign& d) {
+  return static_cast<std::int32_t>(100 * d.cells * d.limits.voltage_max_v + 0.5);
+}
 constexpr double largest_limit_a(const PackDesign& d) {
   return std::max(d.limits.charge_current_max_a, d.limits.discharge_current_max_a);
 }

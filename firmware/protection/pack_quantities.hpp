@@ -180,14 +180,16 @@ class PackQuantities {
   constexpr void update_temperatures(const std::array<std::int16_t, measurement::max_temperatures>& all,
                                      Quantities& q) {
     TwoEnds ends;
-    std::int32_t sum = 0, known = 0;
+    std::int32_t sum = 0, known = 0, shorted = 0;
     for (std::size_t k = 0; k < limits_.temperatures; ++k) {
+      if (all[k] == measurement::shorted_thermistor) ++shorted;
       if (!measurement::temperature_possible(all[k])) continue;
       ++known;
       sum += all[k];
       ends.add(all[k]);
     }
     at(q, Quantity::temperatures_missing) = limits_.temperatures - known;
+    at(q, Quantity::temperatures_shorted) = shorted;
     at(q, Quantity::temperatures_unknown) = known == 0 && limits_.temperatures > 0;
     at(q, Quantity::highest_cdegc) = known > 0 ? ends.highest : measurement::no_reading;
     at(q, Quantity::lowest_cdegc) = known > 0 ? ends.lowest : measurement::no_reading;

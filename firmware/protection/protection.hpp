@@ -89,7 +89,13 @@ struct ExternalInputs {
   bool storage_fault = false;
   bool supply_dip = false;        ///< the supply of the controller has fallen, perhaps only for a moment
   std::uint32_t second_line = 0;  ///< trips of the front end: measurement::SecondLineTrip
-  std::int32_t second_current_ua = measurement::no_reading;  ///< of the second current sensor, if one is fitted
+  bool second_current_fitted = false;
+  std::int32_t second_current_ua = measurement::no_reading;
+  // Of the truck; an input that is not fitted stays at its initial value.
+  bool coils_dead = false;  ///< the coils have no supply, or had none for a moment: a state, and no fault
+  bool interlock_open = false, crashed = false;
+  bool insulation_monitored = false;
+  std::int32_t insulation_ohm = measurement::no_reading;  ///< between battery and frame
 };
 
 struct Decision {
@@ -145,11 +151,10 @@ class Protection {
     ignored_ = 0;
     Quantities q = unknown_quantities();
     quantities_.update(sample, step_us, q);
-    at(q, Quantity::estimator_contradiction) = estimate.voltage_rejected;
-    at(q, Quantity::storage_failed) = inputs.storage_fault;
     at(q, Quantity::sample_age_us) = static_cast<std::int32_t>(age_us);
     update_current_quantities(q, sample.current_ua, inputs.second_current_ua);
-    excess_.update(sample.current_ua, decision_.allowed, permitted(), step_us, q);
+    update_inputs(q, inputs, estimate.voltage_rejected);
+    excess_.update(sample.current_ua, decision_.allowed, permitted(), !decision_.outputs.any_closed(), step_us, q);
     update_second_line(q);
     clear_ = inputs.clear;
     update_faults(q, step_us, inputs);
@@ -166,6 +171,7 @@ class Protection {
                        .charge_forbidden = no_charge,
                        .discharge_forbidden = no_discharge,
                        .contact_lost = inputs.contact_lost,
+                       .coils_dead = inputs.coils_dead,
                        .current_ua = sample.current_ua,
                        .pack_uv = pack_uv,
                        .link_plus_uv = inputs.link_plus_uv,
@@ -203,6 +209,8 @@ class Protection {
   }
 
   constexpr const Decision& decision() const { return decision_; }
+  /// Balancing::take_bled_ppm().
+  constexpr std::int32_t take_bled_ppm(std::size_t cell) { return balancing_.take_bled_ppm(cell); }
   /// For tests of flipped bits.
   constexpr Contactors& contactors() { return contactors_; }
 
@@ -248,6 +256,18 @@ class Protection {
         exceeds(current_ua, decision_.allowed.charge_ua) || exceeds(-current_ua, decision_.allowed.discharge_ua);
     at(q, Quantity::flows_unrequested) =
         contactors_.state() == ContactorState::unloading && magnitude(current_ua) > rest_ua;
+  }
+
+  static constexpr void update_inputs(Quantities& q, const ExternalInputs& inputs, bool voltage_rejected) {
+    at(q, Quantity::estimator_contradiction) = voltage_rejected;
+    at(q, Quantity::storage_failed) = inputs.storage_fault;
+    at(q, Quantity::second_currents_missing) =
+        inputs.second_current_fitted && inputs.second_current_ua == measurement::no_reading;
+    at(q, Quantity::loop_open) = inputs.interlock_open;
+    at(q, Quantity::crashed) = inputs.crashed;
+    at(q, Quantity::insulation_missing) =
+        inputs.insulation_monitored && inputs.insulation_ohm == measurement::no_reading;
+    at(q, Quantity::insulation_ohm) = inputs.insulation_ohm;
   }
 
   /// Trips since the last call. A short circuit counts as the largest current, because it may be over before a reading.

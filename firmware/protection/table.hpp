@@ -21,58 +21,9 @@
 
 #include "protection/faults.hpp"
 #include "protection/pack_design.hpp"
+#include "protection/rule.hpp"
 
 namespace bms::protection {
-
-/// Quantities that the table compares, in integers; pack_quantities.hpp computes them from samples.
-enum class Quantity : std::uint8_t {
-  highest_cell_uv,
-  lowest_cell_uv,
-  pack_uv,
-  charge_overload_i2t_us,  ///< overload integral I2t of the charge current
-  discharge_overload_i2t_us,
-  current_magnitude_ua,  ///< the largest reading, if the front end reports a short circuit
-  highest_cdegc,
-  lowest_cdegc,
-  opposite_shift_uv,        ///< two neighbouring cells shifted from the mean in opposite directions
-  spread_uv,                ///< highest minus lowest cell
-  estimator_contradiction,  ///< 0 or 1: the estimator rejects the voltage
-  sum_error_uv,             ///< magnitude of sum of cells minus pack
-  voltages_missing,         ///< number of cells, and the pack
-  voltages_stuck,
-  currents_missing,  ///< 0 or 1
-  temperatures_missing,
-  temperatures_stuck,
-  precharge_off_curve,  ///< 0 or 1; this and the next two come from the contactors
-  welded,
-  not_closed,
-  sample_age_us,      ///< since the last usable sample
-  integrity_error,    ///< 0 or 1
-  storage_failed,     ///< 0 or 1
-  second_line_trips,  ///< 0 or 1, as all that follow but the difference of the sensors
-  second_line_broken,
-  current_difference_ua,  ///< magnitude, less the share of the current that the gains explain
-  temperatures_unknown,   ///< no sensor has a reading
-  flows_unrequested,      ///< a current flows while the contactors wait for its end
-  exceeds_allowed,        ///< the current is above the allowed current
-  charge_excess_us,       ///< charge above the allowed current, as time of 1C (excess_charge.hpp)
-  discharge_excess_us,
-  largest_excess_us,  ///< of both directions
-  supply_dips,        ///< 0 or 1
-};
-inline constexpr std::size_t quantity_count = 33;
-
-enum class Sense : std::uint8_t { above, below };
-
-struct Rule {
-  std::int32_t threshold, release;
-  std::uint32_t delay_us, recover_us;
-  Fault fault;
-  Quantity quantity;
-  Sense sense;
-  Recovery recovery;
-  Reaction reaction;
-};
 
 /// One protection as it is written in the table. Thresholds are in the unit of the quantity.
 struct Protected {
@@ -355,12 +306,42 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = in_micro(10.2), .after_s = 10, .recovery = automatic},
            .reaction = open_now,
            .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
-                  "released after two minutes, as its direction stays forbidden and opens again at once"}),
+                  "released after two minutes, as the next charge above the allowed current opens again at once"}),
       row({.fault = supply_dip,
            .raised = {.quantity = supply_dips, .sense = above, .threshold = 0, .delay_s = 0},
            .released = {.threshold = 0, .after_s = 1, .recovery = automatic},
            .reaction = open_now,
            .why = "no delay: the interrupt has already opened"}),
+      row({.fault = thermistor_shorted,
+           .raised = {.quantity = temperatures_shorted, .sense = above, .threshold = 0, .delay_s = 10},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = open,
+           .why = "before the front end, which takes it for a hot cell and opens main plus after 20 s, under load"}),
+      row({.fault = second_current_missing,
+           .raised = {.quantity = second_currents_missing, .sense = above, .threshold = 0, .delay_s = 5},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = derate,
+           .why = "after a start the sensor learns its value at no current for 0.8 s"}),
+      row({.fault = interlock_open,
+           .raised = {.quantity = loop_open, .sense = above, .threshold = 0, .delay_s = 0.2},
+           .released = {.threshold = 0, .after_s = 5, .recovery = automatic},
+           .reaction = open_now,
+           .why = "two samples at 10 Hz: a loop that vibrates; its contacts part before those of the power"}),
+      row({.fault = crash,
+           .raised = {.quantity = crashed, .sense = above, .threshold = 0, .delay_s = 0},
+           .released = {.threshold = 0, .after_s = 10, .recovery = service},
+           .reaction = open_now,
+           .why = "no delay: the sensor has decided"}),
+      row({.fault = insulation_low,
+           .raised = {.quantity = insulation_ohm, .sense = below, .threshold = least_insulation_ohm(d), .delay_s = 10},
+           .released = {.threshold = least_insulation_ohm(d) / 4 * 5, .after_s = 60, .recovery = automatic},
+           .reaction = forbid_charge,
+           .why = "the monitor has averaged; a first fault does not stop a truck, but the charger is earthed"}),
+      row({.fault = insulation_unknown,
+           .raised = {.quantity = insulation_missing, .sense = above, .threshold = 0, .delay_s = 60},
+           .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
+           .reaction = warn,
+           .why = "a monitor needs up to 20 s for its first value"}),
   }};
 }
 

@@ -80,6 +80,18 @@ constexpr QuantityText text_of_event(Quantity q) {
       return {"charge above the allowed current in the worse direction, as time of 1C,", "s", 1e6, 1};
     case Quantity::supply_dips:
       return {"supply of the controller has fallen below the detector's threshold"};
+    case Quantity::temperatures_shorted:
+      return {"thermistors shorted"};
+    case Quantity::second_currents_missing:
+      return {"second current sensor without a reading"};
+    case Quantity::loop_open:
+      return {"interlock loop open"};
+    case Quantity::crashed:
+      return {"crash or tilt sensor"};
+    case Quantity::insulation_missing:
+      return {"insulation monitor without a reading"};
+    case Quantity::insulation_ohm:
+      return {"insulation between battery and frame", "kohm", 1e3, 2};
     default:
       return {};
   }

@@ -5,6 +5,7 @@
 
 namespace bms::hal {
 
+bool second_current_fitted() { return false; }
 std::int32_t second_current_ua() { return measurement::no_reading; }
 
 }  // namespace bms::hal

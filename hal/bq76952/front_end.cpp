@@ -35,7 +35,8 @@ std::int16_t cdegc(std::int16_t tenth_k) {
   const int value = tenth_k * 10 - 27'315;
   const auto narrow = static_cast<std::int16_t>(
       std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
-  return measurement::temperature_possible(narrow) ? narrow : measurement::no_temperature;  // open or shorted sensor
+  if (measurement::temperature_possible(narrow)) return narrow;
+  return narrow > 0 ? measurement::shorted_thermistor : measurement::no_temperature;
 }
 
 }  // namespace

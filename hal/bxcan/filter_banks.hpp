@@ -18,16 +18,16 @@ struct FilterBank {
 constexpr std::uint32_t filter_of(std::uint16_t id) { return static_cast<std::uint32_t>(id) << 5; }
 
 /// CAN1 has the first 14 of the 28 banks by default (CAN_FMR, CAN2SB).
-inline constexpr std::size_t ids_per_bank = 4, max_ids = 14 * ids_per_bank;
-
-/// Returns true if the banks have room for all identifiers, and each has 11 bits.
-constexpr bool fits(std::span<const std::uint16_t> ids) {
-  return !ids.empty() && ids.size() <= max_ids &&
-         std::all_of(ids.begin(), ids.end(), [](std::uint16_t id) { return id <= 0x7FF; });
-}
+inline constexpr std::size_t max_banks = 14, ids_per_bank = 4, max_ids = max_banks * ids_per_bank;
 
 constexpr std::size_t bank_count(std::span<const std::uint16_t> ids) {
   return (ids.size() + ids_per_bank - 1) / ids_per_bank;
+}
+
+/// Returns true if the banks have room for all identifiers, of which each has 11 bits, and for `long_ids` of 29 bits.
+constexpr bool fits(std::span<const std::uint16_t> ids, std::size_t long_ids) {
+  return !ids.empty() && bank_count(ids) + long_ids <= max_banks &&
+         std::all_of(ids.begin(), ids.end(), [](std::uint16_t id) { return id <= 0x7FF; });
 }
 
 /// Bank k of a list that fits. Unused entries repeat the last identifier.

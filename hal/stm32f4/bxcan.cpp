@@ -38,7 +38,8 @@ namespace {
 
 using namespace stm32f4;
 
-static_assert(bxcan::fits(request_ids) && bxcan::fits(request_and_sample_ids));
+static_assert(bxcan::fits(request_ids, long_ids.size()) && bxcan::fits(request_and_sample_ids, long_ids.size()),
+              "too many identifiers for the acceptance filters of CAN1");
 
 struct Rate {
   std::uint32_t bit_rate, btr, phase_timeout_us;

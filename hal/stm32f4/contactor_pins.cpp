@@ -1,5 +1,6 @@
 // PC6 main plus, PC7 main minus, PC8 precharge, PC9 charge enable. A high level closes. All are open while the supply
-// is low, and after a fall of it or a lost contact until the firmware has acknowledged it. Registers: RM0090, 8.4.
+// is low, and after a fall of it, a lost contact or a lost coil supply until the firmware has acknowledged it.
+// Registers: RM0090, 8.4.
 #include "hal/contactor_pins.hpp"
 
 #include "hal/stm32f4/registers.hpp"
@@ -12,7 +13,7 @@ namespace {
 
 bool on = false;  ///< the last call closes a contactor
 
-bool forbidden() { return supply_falls() != 0 || contact_losses() != 0; }
+bool forbidden() { return supply_falls() != 0 || contact_losses() != 0 || coil_losses() != 0; }
 
 }  // namespace
 

@@ -35,6 +35,8 @@ inline Register& rng_dr() { return at<0x50060808>(); }
 
 // GPIOA, GPIOB [8.4]
 inline Register& gpioa_moder() { return at<0x40020000>(); }
+inline Register& gpioa_pupdr() { return at<0x4002000C>(); }
+inline Register& gpioa_afrl() { return at<0x40020020>(); }
 inline Register& gpiob_moder() { return at<0x40020400>(); }
 inline Register& gpiob_pupdr() { return at<0x4002040C>(); }
 inline Register& gpiob_afrl() { return at<0x40020420>(); }
@@ -46,6 +48,8 @@ inline Register& gpiob_bsrr() { return at<0x40020418>(); }
 // GPIOC [8.4]
 inline Register& gpioc_moder() { return at<0x40020800>(); }
 inline Register& gpioc_otyper() { return at<0x40020804>(); }
+inline Register& gpioc_pupdr() { return at<0x4002080C>(); }
+inline Register& gpioc_idr() { return at<0x40020810>(); }
 inline Register& gpioc_odr() { return at<0x40020814>(); }
 inline Register& gpioc_bsrr() { return at<0x40020818>(); }
 
@@ -68,6 +72,18 @@ inline Register& i2c1_sr1() { return at<0x40005414>(); }
 inline Register& i2c1_sr2() { return at<0x40005418>(); }
 inline Register& i2c1_ccr() { return at<0x4000541C>(); }
 inline Register& i2c1_trise() { return at<0x40005420>(); }
+
+// timer 3 [18.4]
+inline Register& tim3_cr1() { return at<0x40000400>(); }
+inline Register& tim3_smcr() { return at<0x40000408>(); }
+inline Register& tim3_sr() { return at<0x40000410>(); }
+inline Register& tim3_egr() { return at<0x40000414>(); }
+inline Register& tim3_ccmr1() { return at<0x40000418>(); }
+inline Register& tim3_ccer() { return at<0x40000420>(); }
+inline Register& tim3_psc() { return at<0x40000428>(); }
+inline Register& tim3_arr() { return at<0x4000042C>(); }
+inline Register& tim3_ccr1() { return at<0x40000434>(); }
+inline Register& tim3_ccr2() { return at<0x40000438>(); }
 
 // timer 5 [18.4]
 inline Register& tim5_cr1() { return at<0x40000C00>(); }
@@ -110,11 +126,13 @@ inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cas
 inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
 
 // external interrupts [12.3], their ports [9.2]
+inline Register& syscfg_exticr2() { return at<0x4001380C>(); }
 inline Register& syscfg_exticr4() { return at<0x40013814>(); }
 inline Register& exti_imr() { return at<0x40013C00>(); }
 inline Register& exti_rtsr() { return at<0x40013C08>(); }
+inline Register& exti_ftsr() { return at<0x40013C0C>(); }
 inline Register& exti_pr() { return at<0x40013C14>(); }
-inline constexpr unsigned pvd_interrupt = 1, exti15_10_interrupt = 40;
+inline constexpr unsigned pvd_interrupt = 1, exti4_interrupt = 10, exti15_10_interrupt = 40;
 
 // real-time clock [26.6]
 inline Register& rtc_tr() { return at<0x40002800>(); }

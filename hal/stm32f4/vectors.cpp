@@ -11,6 +11,7 @@ void clock_interrupt();
 [[gnu::weak, gnu::naked]] void can1_tx_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_rx0_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void pvd_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void exti4_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void exti15_10_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void tim5_interrupt() { asm volatile("b fault_handler"); }
 
@@ -42,6 +43,7 @@ constexpr auto table() {
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::pvd_interrupt, ::pvd_interrupt);
+  all.serve(cortex_m::core_exceptions + stm32f4::exti4_interrupt, ::exti4_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::exti15_10_interrupt, ::exti15_10_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::tim5_interrupt, ::tim5_interrupt);
   return all;

@@ -27,13 +27,14 @@ namespace bms::protection {
 inline constexpr std::size_t charge_overload = 8, discharge_overload = 9, implausible = 18, precharge = 26, welded = 27,
                              not_closed = 28, no_samples = 29, internal_error = 30, failed_storage = 31,
                              tripped_line = 32, failed_line = 33, other_sensor = 34, unrequested = 36, exceeded = 37,
-                             charge_limit = 38, discharge_limit = 39, not_obeyed = 40, dip = 41;
+                             charge_limit = 38, discharge_limit = 39, not_obeyed = 40, dip = 41, shorted = 42;
 /// Faults of precharge, contactors and missing samples: cases of their own.
 inline constexpr std::array contactor_rows{precharge, welded, not_closed, no_samples};
-/// Returns true if frames can cause fault k; the others are tested on the boards in Unicorn.
+/// Returns true if frames can cause fault k; the others are tested on the boards in Unicorn, those from the inputs of
+/// the truck also in the world.
 constexpr bool in_frames(std::size_t k) {
   return k != internal_error && k != failed_storage && k != tripped_line && k != failed_line && k != other_sensor &&
-         k != dip;
+         k != dip && k <= shorted;
 }
 /// Rows whose quantity is the charge above the allowed current.
 constexpr bool of_a_limit(std::size_t k) { return k == charge_limit || k == discharge_limit || k == not_obeyed; }

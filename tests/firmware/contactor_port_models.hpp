@@ -9,12 +9,12 @@
 
 namespace bms::firmware {
 
-/// Port C: BSRR sets and resets bits of ODR; set wins.
+/// Port C: BSRR sets and resets bits of ODR; set wins. The inputs of the truck are at PC2 to PC5 and PC13.
 class ContactorPort : public UnicornBoard::Peripheral {
  public:
   static constexpr std::uint32_t base = 0x40020800;
 
-  std::uint32_t read(std::uint32_t offset, double) override { return registers_[offset / 4]; }
+  std::uint32_t read(std::uint32_t offset, double) override { return offset == 0x10 ? inputs : registers_[offset / 4]; }
   void write(std::uint32_t offset, std::uint32_t value, double) override {
     if (offset == 0x18)
       registers_[0x14 / 4] = (registers_[0x14 / 4] & ~(value >> 16)) | (value & 0xFFFF);
@@ -24,6 +24,8 @@ class ContactorPort : public UnicornBoard::Peripheral {
   void chip_reset() override { registers_ = {}; }
   std::uint32_t output() const { return registers_[0x14 / 4]; }
   std::uint32_t mode() const { return registers_[0]; }
+
+  std::uint32_t inputs = 1U << 4 | 1U << 5 | 1U << 13;  ///< no key, no charger plug
 
  private:
   std::array<std::uint32_t, 256> registers_{};

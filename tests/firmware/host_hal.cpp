@@ -15,8 +15,12 @@ void host_hal::begin() {
   switched = {};
   link_readings = {0, 0};
   contacts = {};
+  truck = {};
+  insulation = {};
+  truck_outputs = 0;
   second_line = 0;
   front_end = {};
+  second_current_sensor = false;
   second_current_reading_ua = measurement::no_reading;
   cause = hal::ResetCause::power_on;
   fault.reset();
@@ -73,6 +77,11 @@ AuxiliaryContacts auxiliary_contacts() { return host_hal::contacts; }
 void acknowledge_contact_losses(std::uint32_t losses) { host_hal::contacts.losses -= losses; }
 std::uint32_t second_line_trips() { return host_hal::second_line; }
 FrontEndHealth front_end_health() { return host_hal::front_end; }
+bool second_current_fitted() { return host_hal::second_current_sensor; }
+TruckInputs truck_inputs() { return host_hal::truck; }
+void acknowledge_coil_losses(std::uint32_t losses) { host_hal::truck.coil_losses -= losses; }
+void truck_outputs_set(std::uint32_t outputs) { host_hal::truck_outputs = outputs; }
+Insulation insulation() { return host_hal::insulation; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }

@@ -11,10 +11,12 @@
 
 #include "firmware/application.hpp"
 #include "hal/device_key.hpp"
+#include "hal/insulation.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
 #include "hal/request_queue.hpp"
 #include "hal/second_current.hpp"
+#include "hal/truck_inputs.hpp"
 #include "tests/cells.hpp"
 
 namespace bms::host_hal {
@@ -27,8 +29,12 @@ inline std::vector<std::vector<std::uint32_t>> recorded;
 inline hal::PowerPath switched;
 inline hal::LinkVoltages link_readings{0, 0};
 inline hal::AuxiliaryContacts contacts;
+inline hal::TruckInputs truck;
+inline hal::Insulation insulation;
+inline std::uint32_t truck_outputs = 0;
 inline std::uint32_t second_line = 0;
 inline hal::FrontEndHealth front_end;
+inline bool second_current_sensor = false;  ///< is fitted
 inline std::int32_t second_current_reading_ua = measurement::no_reading;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;

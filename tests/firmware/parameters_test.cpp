@@ -6,6 +6,7 @@
 
 #include "firmware/board_design.hpp"
 #include "firmware/board_parameters.hpp"
+#include "firmware/boot/update_server.hpp"
 #include "tests/firmware/service_fixture.hpp"
 #include "tests/firmware/stored_state_fixture.hpp"
 
@@ -18,6 +19,8 @@ using Answer = can::CommandAnswer;
 
 constexpr authentication::Key own_key{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16};
 constexpr std::uint32_t sample_us = 100'000;
+static_assert(parameters::update_request == boot::update_request_id);
+static_assert(parameters::update_response == boot::update_response_id);
 
 const protection::ProtectionPlan& plan_of_build() {
   static const auto plan = protection::protection_plan(host_hal::Table9Board<16>::design(0.1));
@@ -126,6 +129,28 @@ class ParametersTest : public ::testing::Test {
     for (const auto& [p, value] : changes) at(values, p) = value;
     return values;
   }
+
+  /// The current records of these kinds cannot be read any more.
+  static void decay(FlashModel& flash, std::initializer_list<storage::Kind> kinds) {
+    plug_in(&flash);
+    storage::Log log;
+    log.open();
+    std::size_t decayed = 0;
+    for (const auto& r : log.current_records()) {
+      for (const storage::Kind kind : kinds) {
+        if (r.kind.type != kind.type) continue;
+        flash.flip(r.sector, (r.line + 1U) * storage::line_bytes + 2, 0x10);
+        ++decayed;
+      }
+    }
+    ASSERT_EQ(decayed, kinds.size());
+  }
+
+  static constexpr std::initializer_list<std::pair<Parameter, std::int32_t>> on_a_canopen_truck{
+      {Parameter::discharge_current_max, 30},
+      {Parameter::can_bit_rate, 500},
+      {Parameter::can_base, 0x500},
+      {Parameter::can_stop, 0x050}};
 
   const std::vector<std::uint8_t> erased = std::vector<std::uint8_t>(0x4000, 0xFF);
   FlashModel new_chip{{3, 0x4000}, 1};
@@ -239,7 +264,7 @@ TEST_F(ParametersTest, EveryValueBeyondItsRangeIsRefusedAndDiscardsTheSet) {
   EXPECT_EQ(refused, 79);
   // each possible, but not together: two messages with one identifier
   for (const auto& [p, value] : {std::pair{Parameter::can_stop, 0x1A0}, std::pair{Parameter::can_base, 0x300},
-                                 std::pair{Parameter::can_base, 0x700}}) {
+                                 std::pair{Parameter::can_base, 0x700}, std::pair{Parameter::can_base, 0x780}}) {
     begin(board);
     EXPECT_EQ(set(board, p, value), Answer::result_done);
     EXPECT_EQ(apply(board, with({{p, value}})), Answer::result_refused) << value;
@@ -339,20 +364,15 @@ TEST_F(ParametersTest, LostCopiesOpenAndAreReportedUntilAWorkshopAcceptsTheBuild
   run(board, 3);
   open_session(board);
   begin(board);
-  set(board, Parameter::discharge_current_max, 30);
-  ASSERT_EQ(apply(board, with({{Parameter::discharge_current_max, 30}})), Answer::result_done);
+  for (const auto& [p, value] : on_a_canopen_truck) ASSERT_EQ(set(board, p, value), Answer::result_done);
+  ASSERT_EQ(apply(board, with(on_a_canopen_truck)), Answer::result_done);
   // both copies of the record decay; the settings remain
   FlashModel decayed = board.flash();
-  {
-    plug_in(&decayed);
-    storage::Log log;
-    log.open();
-    for (const auto& r : log.current_records()) {
-      if (r.kind.type == storage::parameters_kind.type || r.kind.type == storage::parameters_copy_kind.type)
-        decayed.flip(r.sector, (r.line + 1U) * storage::line_bytes + 2, 0x10);
-    }
-  }
+  decay(decayed, {storage::parameters_kind, storage::parameters_copy_kind});
   ParameterBoard again(decayed);
+  for (const Parameter p : {Parameter::can_bit_rate, Parameter::can_base, Parameter::can_stop})
+    EXPECT_EQ(at(active(), p), at(with(on_a_canopen_truck), p)) << "on the bus as before";
+  EXPECT_EQ(at(active(), Parameter::discharge_current_max), at(ranges(), Parameter::discharge_current_max).initial);
   run(again, 3);
   EXPECT_EQ(last<can::Board>()->parameters_lost, 1U);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 1U);
@@ -363,6 +383,9 @@ TEST_F(ParametersTest, LostCopiesOpenAndAreReportedUntilAWorkshopAcceptsTheBuild
   result_of(again, workshop.command(can::Command::code_clear_faults, 1));
   run(again, 3);
   EXPECT_EQ(last<can::Faults>()->internal_fault, 0U);
+  ParameterBoard accepted(again.flash());
+  EXPECT_FALSE(ParameterCell::parameters().lost());
+  EXPECT_EQ(at(active(), Parameter::can_base), 0x500) << "the accepted set keeps the bus";
 }
 
 TEST_F(ParametersTest, AFlippedBitOfThePlanIsAnInternalFault) {
@@ -428,9 +451,23 @@ TEST(PackCurrent, OfALargePackGoesBeyond655AmperesAndThatOfASmallOneIsNotSent) {
   pack.current_ua = measurement::no_reading;
   large.process_sample(pack);
   EXPECT_EQ(last<can::PackCurrent>()->current, can::PackCurrent::current_layout.invalid);
-  host_hal::sent.clear();
-  small.process_sample(pack);
-  EXPECT_FALSE(last<can::PackCurrent>());
+  const auto sent_by = [&](auto& application) {
+    host_hal::sent.clear();
+    for (int k = 0; k < 20; ++k) {
+      pack.time_us += 100'000;
+      application.process_sample(pack);
+    }
+    const auto of = [](std::uint32_t id) {
+      return std::ranges::count_if(host_hal::sent, [&](const can::Frame& f) { return f.id == id; });
+    };
+    return std::array{of(can::PackElectrical::id), of(can::PackCurrent::id)};
+  };
+  const auto [large_electrical, large_current] = sent_by(large);
+  const auto [small_electrical, small_current] = sent_by(small);
+  EXPECT_EQ(large_electrical, 20);
+  EXPECT_EQ(large_current, 20);
+  EXPECT_EQ(small_electrical, 20) << "it sends, but not this message";
+  EXPECT_EQ(small_current, 0);
 }
 
 }  // namespace

@@ -29,8 +29,10 @@ struct TruckBoard : Board<16> {
 class TruckDay {
  public:
   /// device_key: makes the image one for a product.
+  /// inputs: bits of hal::TruckInput that are fitted
   explicit TruckDay(bool auxiliary_contacts = true,
-                    const std::optional<std::array<std::uint8_t, 16>>& device_key = std::nullopt) {
+                    const std::optional<std::array<std::uint8_t, 16>>& device_key = std::nullopt,
+                    std::uint32_t inputs = 0) {
     host_hal::begin();
     host_hal::key = device_key;
     host_hal::development = !device_key;
@@ -40,6 +42,7 @@ class TruckDay {
     persistence_.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
     application_.emplace(std::nullopt, messages::Identity{host_hal::cell_hash, 0}, 280.F, persistence_);
     host_hal::contacts.fitted = auxiliary_contacts;
+    host_hal::truck.fitted = inputs;
     run(1);
   }
   ~TruckDay() {
@@ -51,9 +54,11 @@ class TruckDay {
 
   // What the day does.
   bool key = false, emergency_stop = false;
-  bool talks = true;  ///< the truck sends its request every second, also request 0
-  double load_a = 0;  ///< of drive, converter and fan, while the contactors are closed
-  double idle_w = 0;  ///< on the DC link, also while it is precharged
+  bool interlock = true, crashed = false, seen_plug = false,
+       key_input = false;  ///< levels of the inputs, if they are fitted
+  bool talks = true;       ///< the truck sends its request every second, also request 0
+  double load_a = 0;       ///< of drive, converter and fan, while the contactors are closed
+  double idle_w = 0;       ///< on the DC link, also while it is precharged
   struct Charger {
     bool plugged = false, on = true;
     double current_a = 100;
@@ -83,11 +88,13 @@ class TruckDay {
     for (std::size_t k = 0; k < 16; ++k) s.cell_uv[k] = 3'280'000 + static_cast<std::int32_t>((samples_ + k) % 3) * 500;
     s.pack_uv = static_cast<std::int32_t>(1e6 * pack_v);
     s.temperature_cdegc.fill(2'500);
-    for (std::size_t k = 0; k < 4; ++k) s.temperature_cdegc[k] += static_cast<std::int16_t>((samples_ + k) % 4);
+    s.temperature_cdegc[0] = first_cdegc;
+    for (std::size_t k = 1; k < 4; ++k) s.temperature_cdegc[k] += static_cast<std::int16_t>((samples_ + k) % 4);
     s.current_ua = static_cast<std::int32_t>(1e6 * current_a);
     const plant::LinkPoles poles = plant::link_poles(plus_ || relay_, minus_, pack_v, link_v_);
     host_hal::link_readings = {static_cast<std::int32_t>(1e6 * poles.plus_v),
                                static_cast<std::int32_t>(1e6 * poles.minus_v)};
+    set_inputs();
     application_->process_sample(s);
   }
   void run(double seconds) {
@@ -127,14 +134,24 @@ class TruckDay {
   }
 
   static constexpr double pack_v = 16 * 3.2805;
+  std::int16_t first_cdegc = 2'500;  ///< of the first thermistor
 
  private:
+  void set_inputs() {
+    const auto bit = [](hal::TruckInput input, bool on) { return on ? static_cast<std::uint32_t>(input) : 0U; };
+    host_hal::truck.on = bit(hal::TruckInput::coil_supply, !emergency_stop) |
+                         bit(hal::TruckInput::interlock, interlock) | bit(hal::TruckInput::crash, !crashed) |
+                         bit(hal::TruckInput::charger_plug, seen_plug) | bit(hal::TruckInput::key, key_input);
+  }
   /// The interrupt of an auxiliary contact, or that of the supply, has opened all outputs until the firmware knows it.
   void move_contacts() {
     const auto& out = host_hal::switched;
     const bool lost = emergency_stop && host_hal::contacts.fitted && (out.main_plus || out.main_minus);
+    const bool watched = host_hal::truck.has(hal::TruckInput::coil_supply);
+    if (emergency_stop && watched && out.main_minus) host_hal::truck.coil_losses = 1;
     if (lost && host_hal::contacts.losses == 0) host_hal::contacts.losses = 1;
-    const bool coils = !emergency_stop && host_hal::contacts.losses == 0 && host_hal::supply_falls == 0;
+    const bool coils = !emergency_stop && host_hal::contacts.losses == 0 && host_hal::truck.coil_losses == 0 &&
+                       host_hal::supply_falls == 0;
     plus_ = out.main_plus && coils;
     minus_ = out.main_minus && coils;
     relay_ = out.precharge && coils;

@@ -97,9 +97,12 @@ TEST(FilterBanks, ContainEachIdentifierOnceInBits15To5AndRepeatTheLast) {
   EXPECT_EQ(filter_bank(ids, 0).fr2, 0xFFE06240U);
   EXPECT_EQ(filter_bank(ids, 1).fr1, 0x00200020U);
   EXPECT_EQ(filter_bank(ids, 1).fr2, 0x00200020U);
-  EXPECT_FALSE(fits(std::array<std::uint16_t, 1>{0x800}));
-  EXPECT_TRUE(fits(std::array<std::uint16_t, 56>{}));
-  EXPECT_FALSE(fits(std::array<std::uint16_t, 57>{}));
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 1>{0x800}, 0));
+  EXPECT_TRUE(fits(std::array<std::uint16_t, 56>{}, 0));
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 57>{}, 0));
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 56>{}, 1)) << "a 29-bit identifier has a bank of its own";
+  EXPECT_TRUE(fits(std::array<std::uint16_t, 48>{}, 2));
+  EXPECT_FALSE(fits(std::array<std::uint16_t, 49>{}, 2));
 }
 
 /// On a CANopen bus, 0x310 to 0x31D are the process data of other devices (receive PDO 2 of nodes 16 to 29).

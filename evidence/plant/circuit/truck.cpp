@@ -89,12 +89,12 @@ void Truck::set_precharge_ohm(double ohm) {
 void Truck::update_supplies(double duration_s) {
   const SupplyParameters& supply = parameters_.supply;
   double coils_a = 0;
-  const double coil_supply_v = std::max(0.0, supply.coil_v - depth_v(coil_dips_, time_s()));
+  const double coil_v = coil_supply_v();
   for (std::size_t k = 0; k < relays; ++k) {
     bool driven = pins_.relay[k] == PinLevel::high;
     if (k == static_cast<std::size_t>(Relay::main_plus)) driven = driven && pins_.ddsg == PinLevel::high;
     if (k == static_cast<std::size_t>(Relay::charge)) driven = driven && pins_.dchg == PinLevel::high;
-    contactors_[k].set_coil_v(driven ? coil_supply_v : 0);
+    contactors_[k].set_coil_v(driven ? coil_v : 0);
     coils_a += contactors_[k].coil_a();
   }
   steady_coil_a_ = coils_a + (steady_coil_a_ - coils_a) / (1 + duration_s / supply.rail_recovery_s);
@@ -196,6 +196,8 @@ void Truck::advance(double duration_s) {
   }
 }
 
+double Truck::coil_supply_v() const { return std::max(0.0, parameters_.supply.coil_v - depth_v(coil_dips_, time_s())); }
+
 PinVoltages Truck::pins() const {
   const double b_a = current_a();
   return {.ld_v = circuit_.voltage_v(network_.ld_pin),
@@ -207,7 +209,8 @@ PinVoltages Truck::pins() const {
           .pb15_v = contactor(Relay::main_minus).auxiliary_closed() ? 0 : vdda_v_,
           .pa1_v = hall_pin_v(parameters_.hall[0], b_a),
           .pa2_v = hall_pin_v(parameters_.hall[1], b_a),
-          .shunt_v = -circuit_.voltage_v(network_.b_minus)};
+          .shunt_v = -circuit_.voltage_v(network_.b_minus),
+          .pc4_v = std::min(vdda_v_, coil_supply_v() * 12 / 45)};  // 33 kohm, 12 kohm
 }
 
 TrueVoltages Truck::voltages() const {

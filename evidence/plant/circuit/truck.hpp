@@ -55,6 +55,7 @@ struct PinVoltages {
   double pb14_v, pb15_v;  ///< auxiliary contacts of K1 and K2: 0 when the main contact is closed
   double pa1_v, pa2_v;    ///< Hall sensors
   double shunt_v;         ///< > 0 charges
+  double pc4_v;           ///< divided supply of the coils
 };
 
 struct TrueVoltages {
@@ -109,6 +110,7 @@ class Truck {
 
  private:
   std::size_t contact(Relay relay) const { return network_.contact[static_cast<std::size_t>(relay)]; }
+  double coil_supply_v() const;
   void update_supplies(double duration_s);
   void update_drive();
   void update_charger();

@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: cbb3b6f2fe1e640cf6960e3665f9b3124907fe5e7cd3d9a87857365cf9ff699c
+// SHA-256 of that file: 8e1470e0b1d1c156f503062a372394cfefa263d72cc21c572349b0d30d2568d8
 #pragma once
 
 #include <array>
@@ -1352,7 +1352,7 @@ struct Faults {
   std::uint32_t internal_fault = 0;  ///< The firmware found an internal error, or the watchdog reset it.
   static constexpr SignalLayout storage_fault_layout = {47, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t storage_fault = 0;  ///< Records cannot be stored.
-  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 42.0F, true, 63};
+  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 48.0F, true, 63};
   std::uint32_t first_cause = 0;  ///< First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.
   static constexpr std::uint32_t first_cause_none = 0;
   static constexpr std::uint32_t first_cause_cell_overvoltage_warning = 1;
@@ -1397,6 +1397,12 @@ struct Faults {
   static constexpr std::uint32_t first_cause_discharge_limit_exceeded = 40;
   static constexpr std::uint32_t first_cause_limit_not_obeyed = 41;
   static constexpr std::uint32_t first_cause_supply_dip = 42;
+  static constexpr std::uint32_t first_cause_thermistor_shorted = 43;
+  static constexpr std::uint32_t first_cause_second_current_missing = 44;
+  static constexpr std::uint32_t first_cause_interlock_open = 45;
+  static constexpr std::uint32_t first_cause_crash = 46;
+  static constexpr std::uint32_t first_cause_insulation_low = 47;
+  static constexpr std::uint32_t first_cause_insulation_unknown = 48;
   static constexpr std::uint32_t first_cause_not_known = 63;
 
   constexpr can::Frame frame(std::uint8_t counter) const {
@@ -1546,7 +1552,7 @@ struct Faults {
     see("SamplesMissing", "No samples arrive.", std::span<const ValueName>());
     see("InternalFault", "The firmware found an internal error, or the watchdog reset it.", std::span<const ValueName>());
     see("StorageFault", "Records cannot be stored.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 44> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 50> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{43, "thermistor shorted"}, ValueName{44, "second current missing"}, ValueName{45, "interlock open"}, ValueName{46, "crash"}, ValueName{47, "insulation low"}, ValueName{48, "insulation unknown"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
   }
 };
 
@@ -1576,6 +1582,18 @@ struct MoreFaults {
   std::uint32_t limit_not_obeyed = 0;  ///< The charge above AllowedCurrent has reached 0.3 % of the capacity: the contactors have opened.
   static constexpr SignalLayout supply_dip_layout = {25, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t supply_dip = 0;  ///< The supply of the controller has fallen, perhaps only for a moment: the contactors have opened.
+  static constexpr SignalLayout thermistor_shorted_layout = {26, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t thermistor_shorted = 0;  ///< A thermistor is shorted. The measuring chip takes it for a hot cell and opens, so the firmware opens before, in an orderly way.
+  static constexpr SignalLayout second_current_missing_layout = {27, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t second_current_missing = 0;  ///< The second current sensor is fitted and gives no reading.
+  static constexpr SignalLayout interlock_open_layout = {28, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t interlock_open = 0;  ///< The loop through the power connectors is open.
+  static constexpr SignalLayout crash_layout = {29, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t crash = 0;  ///< The crash or tilt sensor has opened the contactors. Only a workshop clears it.
+  static constexpr SignalLayout insulation_low_layout = {30, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t insulation_low = 0;  ///< The resistance between battery and frame is below 100 ohm per volt: charging is forbidden.
+  static constexpr SignalLayout insulation_unknown_layout = {31, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t insulation_unknown = 0;  ///< The insulation monitor has given no value for a minute.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
@@ -1589,6 +1607,12 @@ struct MoreFaults {
     put<discharge_limit_exceeded_layout>(out, discharge_limit_exceeded);
     put<limit_not_obeyed_layout>(out, limit_not_obeyed);
     put<supply_dip_layout>(out, supply_dip);
+    put<thermistor_shorted_layout>(out, thermistor_shorted);
+    put<second_current_missing_layout>(out, second_current_missing);
+    put<interlock_open_layout>(out, interlock_open);
+    put<crash_layout>(out, crash);
+    put<insulation_low_layout>(out, insulation_low);
+    put<insulation_unknown_layout>(out, insulation_unknown);
     protect(out, data_id, counter);
     return out;
   }
@@ -1604,6 +1628,12 @@ struct MoreFaults {
     out.discharge_limit_exceeded = get<discharge_limit_exceeded_layout, decltype(out.discharge_limit_exceeded)>(frame);
     out.limit_not_obeyed = get<limit_not_obeyed_layout, decltype(out.limit_not_obeyed)>(frame);
     out.supply_dip = get<supply_dip_layout, decltype(out.supply_dip)>(frame);
+    out.thermistor_shorted = get<thermistor_shorted_layout, decltype(out.thermistor_shorted)>(frame);
+    out.second_current_missing = get<second_current_missing_layout, decltype(out.second_current_missing)>(frame);
+    out.interlock_open = get<interlock_open_layout, decltype(out.interlock_open)>(frame);
+    out.crash = get<crash_layout, decltype(out.crash)>(frame);
+    out.insulation_low = get<insulation_low_layout, decltype(out.insulation_low)>(frame);
+    out.insulation_unknown = get<insulation_unknown_layout, decltype(out.insulation_unknown)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -1619,6 +1649,12 @@ struct MoreFaults {
     see("DischargeLimitExceeded", "", discharge_limit_exceeded, discharge_limit_exceeded_layout);
     see("LimitNotObeyed", "", limit_not_obeyed, limit_not_obeyed_layout);
     see("SupplyDip", "", supply_dip, supply_dip_layout);
+    see("ThermistorShorted", "", thermistor_shorted, thermistor_shorted_layout);
+    see("SecondCurrentMissing", "", second_current_missing, second_current_missing_layout);
+    see("InterlockOpen", "", interlock_open, interlock_open_layout);
+    see("Crash", "", crash, crash_layout);
+    see("InsulationLow", "", insulation_low, insulation_low_layout);
+    see("InsulationUnknown", "", insulation_unknown, insulation_unknown_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
@@ -1633,6 +1669,12 @@ struct MoreFaults {
     see("DischargeLimitExceeded", "A tenth of a percent of the capacity was discharged above AllowedCurrent: discharging is forbidden.", std::span<const ValueName>());
     see("LimitNotObeyed", "The charge above AllowedCurrent has reached 0.3 % of the capacity: the contactors have opened.", std::span<const ValueName>());
     see("SupplyDip", "The supply of the controller has fallen, perhaps only for a moment: the contactors have opened.", std::span<const ValueName>());
+    see("ThermistorShorted", "A thermistor is shorted. The measuring chip takes it for a hot cell and opens, so the firmware opens before, in an orderly way.", std::span<const ValueName>());
+    see("SecondCurrentMissing", "The second current sensor is fitted and gives no reading.", std::span<const ValueName>());
+    see("InterlockOpen", "The loop through the power connectors is open.", std::span<const ValueName>());
+    see("Crash", "The crash or tilt sensor has opened the contactors. Only a workshop clears it.", std::span<const ValueName>());
+    see("InsulationLow", "The resistance between battery and frame is below 100 ohm per volt: charging is forbidden.", std::span<const ValueName>());
+    see("InsulationUnknown", "The insulation monitor has given no value for a minute.", std::span<const ValueName>());
   }
 };
 
@@ -2109,6 +2151,111 @@ struct Board {
     see("LastException", "Processor exception that ended the last run: its number in the vector table; 0: none.", std::span<const ValueName>());
     see("StackFree", "Lowest value so far.", std::span<const ValueName>());
     see("LongestSample", "Longest processing time of a sample so far.", std::span<const ValueName>());
+  }
+};
+
+/// Inputs and outputs of the truck, of a board that has an input (BMS_INPUTS) or an insulation monitor. Also sent at once when an input changes.
+struct TruckInputs {
+  static constexpr const char* name = "TruckInputs";
+  static constexpr std::uint16_t id = 0x1ba;
+  static constexpr std::uint32_t cycle_us = 1000000;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 442;
+  static constexpr SignalLayout heater_layout = {12, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t heater = 0;  ///< Output of the heater.
+  static constexpr SignalLayout fan_layout = {13, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t fan = 0;  ///< Output of the fan.
+  static constexpr SignalLayout soc_lamp_layout = {14, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t soc_lamp = 0;  ///< Output of the lamp; it blinks below 20 %.
+  static constexpr SignalLayout wrong_current_sensor_layout = {16, 2, false, 1.0F, 0.0F, 0.0F, 2.0F, true, 3};
+  std::uint32_t wrong_current_sensor = 0;  ///< While the current sensors differ: the one that contradicts the voltages of the cells.
+  static constexpr std::uint32_t wrong_current_sensor_none = 0;
+  static constexpr std::uint32_t wrong_current_sensor_first = 1;
+  static constexpr std::uint32_t wrong_current_sensor_second = 2;
+  static constexpr std::uint32_t wrong_current_sensor_not_known = 3;
+  static constexpr SignalLayout key_layout = {18, 2, false, 1.0F, 0.0F, 0.0F, 1.0F, true, 3};
+  std::uint32_t key = 0;  ///< Not known: not fitted, as for the next four.
+  static constexpr std::uint32_t key_off = 0;
+  static constexpr std::uint32_t key_on = 1;
+  static constexpr std::uint32_t key_not_known = 3;
+  static constexpr SignalLayout charger_plug_layout = {20, 2, false, 1.0F, 0.0F, 0.0F, 1.0F, true, 3};
+  std::uint32_t charger_plug = 0;  ///< While it is plugged in, a truck does not drive.
+  static constexpr std::uint32_t charger_plug_off = 0;
+  static constexpr std::uint32_t charger_plug_on = 1;
+  static constexpr std::uint32_t charger_plug_not_known = 3;
+  static constexpr SignalLayout coil_supply_layout = {22, 2, false, 1.0F, 0.0F, 0.0F, 1.0F, true, 3};
+  std::uint32_t coil_supply = 0;  ///< Off, as by an emergency stop: nothing closes. This is a state, not a fault; the next new request closes again.
+  static constexpr std::uint32_t coil_supply_off = 0;
+  static constexpr std::uint32_t coil_supply_on = 1;
+  static constexpr std::uint32_t coil_supply_not_known = 3;
+  static constexpr SignalLayout interlock_layout = {24, 2, false, 1.0F, 0.0F, 0.0F, 1.0F, true, 3};
+  std::uint32_t interlock = 0;  ///< Off: the loop through the power connectors is open.
+  static constexpr std::uint32_t interlock_off = 0;
+  static constexpr std::uint32_t interlock_on = 1;
+  static constexpr std::uint32_t interlock_not_known = 3;
+  static constexpr SignalLayout crash_sensor_layout = {26, 2, false, 1.0F, 0.0F, 0.0F, 1.0F, true, 3};
+  std::uint32_t crash_sensor = 0;  ///< Off: crash, tilt, or a broken wire of the sensor.
+  static constexpr std::uint32_t crash_sensor_off = 0;
+  static constexpr std::uint32_t crash_sensor_on = 1;
+  static constexpr std::uint32_t crash_sensor_not_known = 3;
+  static constexpr SignalLayout insulation_layout = {32, 16, false, 0.1F, 0.0F, 0.0F, 6553.4F, true, 65535};
+  float insulation = unknown;  ///< [kohm] Between battery and frame, as the insulation monitor has measured.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<heater_layout>(out, heater);
+    put<fan_layout>(out, fan);
+    put<soc_lamp_layout>(out, soc_lamp);
+    put<wrong_current_sensor_layout>(out, wrong_current_sensor);
+    put<key_layout>(out, key);
+    put<charger_plug_layout>(out, charger_plug);
+    put<coil_supply_layout>(out, coil_supply);
+    put<interlock_layout>(out, interlock);
+    put<crash_sensor_layout>(out, crash_sensor);
+    put<insulation_layout>(out, insulation);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr TruckInputs of(const can::Frame& frame) {
+    TruckInputs out;
+    out.heater = get<heater_layout, decltype(out.heater)>(frame);
+    out.fan = get<fan_layout, decltype(out.fan)>(frame);
+    out.soc_lamp = get<soc_lamp_layout, decltype(out.soc_lamp)>(frame);
+    out.wrong_current_sensor = get<wrong_current_sensor_layout, decltype(out.wrong_current_sensor)>(frame);
+    out.key = get<key_layout, decltype(out.key)>(frame);
+    out.charger_plug = get<charger_plug_layout, decltype(out.charger_plug)>(frame);
+    out.coil_supply = get<coil_supply_layout, decltype(out.coil_supply)>(frame);
+    out.interlock = get<interlock_layout, decltype(out.interlock)>(frame);
+    out.crash_sensor = get<crash_sensor_layout, decltype(out.crash_sensor)>(frame);
+    out.insulation = get<insulation_layout, decltype(out.insulation)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("Heater", "", heater, heater_layout);
+    see("Fan", "", fan, fan_layout);
+    see("SocLamp", "", soc_lamp, soc_lamp_layout);
+    see("WrongCurrentSensor", "", wrong_current_sensor, wrong_current_sensor_layout);
+    see("Key", "", key, key_layout);
+    see("ChargerPlug", "", charger_plug, charger_plug_layout);
+    see("CoilSupply", "", coil_supply, coil_supply_layout);
+    see("Interlock", "", interlock, interlock_layout);
+    see("CrashSensor", "", crash_sensor, crash_sensor_layout);
+    see("Insulation", "kohm", insulation, insulation_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    see("Heater", "Output of the heater.", std::span<const ValueName>());
+    see("Fan", "Output of the fan.", std::span<const ValueName>());
+    see("SocLamp", "Output of the lamp; it blinks below 20 %.", std::span<const ValueName>());
+    { static constexpr std::array<ValueName, 4> names{{ValueName{0, "none"}, ValueName{1, "first"}, ValueName{2, "second"}, ValueName{3, "not known"}}}; see("WrongCurrentSensor", "While the current sensors differ: the one that contradicts the voltages of the cells.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("Key", "Not known: not fitted, as for the next four.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("ChargerPlug", "While it is plugged in, a truck does not drive.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("CoilSupply", "Off, as by an emergency stop: nothing closes. This is a state, not a fault; the next new request closes again.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("Interlock", "Off: the loop through the power connectors is open.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("CrashSensor", "Off: crash, tilt, or a broken wire of the sensor.", std::span<const ValueName>(names)); }
+    see("Insulation", "Between battery and frame, as the insulation monitor has measured.", std::span<const ValueName>());
   }
 };
 
@@ -2991,6 +3138,6 @@ struct PackCurrent {
 };
 
 /// All messages.
-using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent>;
+using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, TruckInputs, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent>;
 
 }  // namespace bms::can

@@ -200,6 +200,37 @@ TEST(ForbiddenCharge, InBurstsOpensWithItsCauseAndClosesAgainWhenTheCauseHasGone
   EXPECT_LT(opened_s, 1.5);
 }
 
+/// In the cold half of the discharge current is allowed, and the truck draws 1.5C. The integral empties in half an
+/// hour; a driver in an aisle must not wait for it.
+TEST(DeratedDischarge, ThatHasOpenedIsAllowedAgainAfterTwoMinutesAndOpensAtOnceIfItIsExceededAgain) {
+  Driver truck(280);
+  truck.start(Request::drive);
+  truck.temperature_c = -12.5;
+  for (int k = 0; k < 30; ++k) truck.step(-0.2);
+  const Decision& d = truck.bench.protection.decision();
+  ASSERT_NEAR(d.allowed.discharge_ua, 140e6, 3e6);
+  double forbidden_s = -1, opened_s = -1;
+  for (int k = 1; k <= 600 && opened_s < 0; ++k) {
+    if (!truck.step(-1.5).outputs.any_closed()) opened_s = 0.1 * k;
+    if (forbidden_s < 0 && (d.faults & bit(Fault::discharge_limit_exceeded)) != 0) forbidden_s = 0.1 * k;
+  }
+  EXPECT_NEAR(forbidden_s, 3.7, 0.2);
+  EXPECT_NEAR(opened_s, 8.6, 0.4) << "five seconds of grace, or the integral";
+  int waits = 0;
+  for (; waits < 2'000 && d.state != ContactorState::drive; ++waits) truck.step(0);
+  EXPECT_LE(waits, 1'700) << "under three minutes, with the driver's key";
+  for (int k = 0; k < 6'000; ++k) {
+    truck.step(-0.45);
+    ASSERT_EQ(d.state, ContactorState::drive) << "a truck that obeys, after " << 0.1 * k << " s";
+  }
+  opened_s = -1;
+  for (int k = 1; k <= 200 && opened_s < 0; ++k) {
+    if (!truck.step(-2.5).outputs.any_closed()) opened_s = 0.1 * k;
+  }
+  EXPECT_GT(opened_s, 0);
+  EXPECT_LT(opened_s, 5.5) << "the integral was not set to 0";
+}
+
 TEST(ForbiddenDischarge, OfAnOverloadOpensBeforeTheGraceTimeIsOver) {
   Driver truck(280);
   truck.start(Request::drive);

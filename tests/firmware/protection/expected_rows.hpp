@@ -73,6 +73,12 @@ inline constexpr ExpectedRow expected_rows[] = {
      "forbid discharge"},
     {"limit not obeyed", "LimitNotObeyed", '>', 10'800'000, 0, 10'200'000, 10'000, 'a', "open now"},
     {"supply dip", "SupplyDip", '>', 0, 0, 0, 1'000, 'a', "open now"},
+    {"thermistor shorted", "ThermistorShorted", '>', 0, 10'000, 0, 10'000, 'a', "open"},
+    {"second current missing", "SecondCurrentMissing", '>', 0, 5'000, 0, 10'000, 'a', "derate"},
+    {"interlock open", "InterlockOpen", '>', 0, 200, 0, 5'000, 'a', "open now"},
+    {"crash", "Crash", '>', 0, 0, 0, 10'000, 's', "open now"},
+    {"insulation low", "InsulationLow", '<', 5'840, 10'000, 7'300, 60'000, 'a', "forbid charge"},
+    {"insulation unknown", "InsulationUnknown", '>', 0, 60'000, 0, 10'000, 'a', "warn"},
 };
 
 }  // namespace bms::protection

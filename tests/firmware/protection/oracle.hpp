@@ -72,7 +72,7 @@ class QuantityOracle {
     }
     std::vector<std::int64_t> warm;
     for (const std::int16_t t : s.temperature_cdegc) {
-      if (t != measurement::no_temperature) warm.push_back(t);
+      if (read(t)) warm.push_back(t);
     }
     const bool pack = s.pack_uv != measurement::no_reading;
     const Value high = largest(cells), low = smallest(cells), hot = largest(warm), cold = smallest(warm);
@@ -97,12 +97,15 @@ class QuantityOracle {
     q[23] = static_cast<std::int64_t>(4 - warm.size());
     q[24] = warm.size() > 1 ? Value(stuck_temperatures()) : std::nullopt;
     q[35] = warm.empty() ? 1 : 0;
+    q[42] = std::ranges::count(s.temperature_cdegc, std::int16_t{32'767});
     return q;
   }
 
  private:
   /// From -0.5 V (reversed) to 6 V.
   static bool readable(std::int32_t uv) { return uv >= -500'000 && uv <= 6'000'000; }
+
+  static bool read(std::int16_t cdegc) { return std::abs(cdegc) < 20'000; }
 
   static Value largest(const std::vector<std::int64_t>& v) {
     return v.empty() ? Value() : Value(*std::max_element(v.begin(), v.end()));
@@ -160,7 +163,7 @@ class QuantityOracle {
   std::vector<std::int64_t> inner_temperatures(std::size_t at, std::size_t sensor) const {
     std::vector<std::int64_t> known;
     for (const std::int16_t t : history_[at].temperature_cdegc) {
-      if (t != measurement::no_temperature) known.push_back(t);
+      if (read(t)) known.push_back(t);
     }
     std::sort(known.begin(), known.end());
     if (known.size() < 2) return {0};
@@ -172,7 +175,7 @@ class QuantityOracle {
     std::int64_t count = 0;
     for (std::size_t k = 0; k < 4; ++k) {
       const auto reading = [&](std::size_t i) { return history_[i].temperature_cdegc[k]; };
-      const auto there = [](std::int16_t t) { return t != measurement::no_temperature; };
+      const auto there = [](std::int16_t t) { return read(t); };
       const auto lower = [&](std::size_t i) { return inner_temperatures(i, k).front(); };
       const auto upper = [&](std::size_t i) { return inner_temperatures(i, k).back(); };
       count += stuck(reading, there, lower, 500) && stuck(reading, there, upper, 500) ? 1 : 0;

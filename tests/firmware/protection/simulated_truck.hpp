@@ -41,7 +41,7 @@ constexpr std::int32_t measured_noise(std::size_t k) {
 
 /// Rows whose quantity comes from samples, without the overload integrals.
 
-constexpr bool visible_in_samples(std::size_t k) { return (k < 26 && k != 8 && k != 9) || k == 35; }
+constexpr bool visible_in_samples(std::size_t k) { return (k < 26 && k != 8 && k != 9) || k == 35 || k == 42; }
 /// Stuck readings are detected only after the others have moved.
 constexpr bool waits_for_others(std::size_t k) { return k == 21 || k == 24; }
 
@@ -213,6 +213,9 @@ inline void inject(std::size_t k, std::int32_t value, TruckPack& truck, measurem
       break;
     case 24:
       if (value > 0) s.temperature_cdegc[0] = 2'345;
+      break;
+    case 42:
+      if (value > 0) s.temperature_cdegc[2] = measurement::shorted_thermistor;
       break;
     case 35:
       if (value > 0) s.temperature_cdegc.fill(measurement::no_temperature);

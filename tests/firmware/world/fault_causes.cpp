@@ -80,8 +80,10 @@ void add_temperature_causes(std::vector<Cause>& list) {
   for (std::size_t sensor = 0; sensor < 4; ++sensor) {
     for (const double ohm : {Bq76952Inputs::open_ohm, 0.0}) {
       list.push_back({23, "thermistor " + std::to_string(sensor + 1) + (ohm == 0 ? " shorted" : " broken"),
-                      [=](TruckWorld& w) { w.set_thermistor_ohm(sensor, ohm); }, 0.7});
+                      [=](TruckWorld& w) { w.set_thermistor_ohm(sensor, ohm); }, 0.7, false, ohm == 0 ? fault(42) : 0});
     }
+    list.push_back({42, "thermistor " + std::to_string(sensor + 1) + " shorted for long",
+                    [=](TruckWorld& w) { w.set_thermistor_ohm(sensor, 0); }, 0.7, false, fault(23)});
   }
   list.push_back({24, "thermistor 1 stuck",
                   [](TruckWorld& w) {
@@ -114,6 +116,10 @@ std::vector<Cause> other_causes() {
                   0,
                   {},
                   true});
+  list.push_back({43, "wire of the Hall sensor broken", [](TruckWorld& w) { w.sensors.hall_error_v = -3; }, 0.4, false,
+                  fault(34)});
+  list.push_back({44, "interlock loop parts", [](TruckWorld& w) { w.interlock = false; }, 0.4});
+  list.push_back({45, "crash", [](TruckWorld& w) { w.crashed = true; }, 0.3});
   list.push_back({36,
                   "current flows after the request has ended",
                   [](TruckWorld& w) { w.vehicle.request = Request::none; },

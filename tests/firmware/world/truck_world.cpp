@@ -15,6 +15,7 @@ using plant::Relay;
 namespace {
 
 constexpr unsigned i2c_clock = 6, i2c_data = 7, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
+constexpr unsigned key = 2, charger_plug = 3, coil_supply = 4, interlock_loop = 5, crash_sensor = 13, port_of_c = 2;
 constexpr double longest_sleep_us = 100;  ///< the front end and the converter are asked for interrupts so often
 constexpr double least_step_ms = 1e-3;
 constexpr double settle_s = 0.03;       ///< the capacitors at the pins charge before the firmware starts
@@ -74,7 +75,7 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
       truck(setup.truck),
       port_a(board, 0),
       port_b(board, port_of_b),
-      port_c(board, 2),
+      port_c(board, port_of_c),
       exti(board),
       adc(board, setup.seed + 17),
       vehicle(board),
@@ -187,12 +188,24 @@ void TruckWorld::update_auxiliary(unsigned pin, double pin_v, double vdda_v) {
   exti.pin_edge(port_of_b, pin, high);
 }
 
+void TruckWorld::update_inputs(const plant::PinVoltages& v) {
+  port_c.set_outside(key, false);
+  port_c.set_outside(charger_plug, plugged);
+  port_c.set_outside(interlock_loop, interlock);
+  port_c.set_outside(crash_sensor, !crashed);
+  const bool supplied = v.pc4_v > 0.5 * v.vdda_v;
+  if (supplied == port_c.outside(coil_supply)) return;
+  port_c.set_outside(coil_supply, supplied);
+  exti.pin_edge(port_of_c, coil_supply, supplied);
+}
+
 void TruckWorld::observe() {
   const plant::PinVoltages v = truck.pins();
   adc.vdda_v = v.vdda_v;
   update_supply(v.vdda_v);
   update_auxiliary(plus_auxiliary, v.pb14_v, v.vdda_v);
   update_auxiliary(minus_auxiliary, v.pb15_v, v.vdda_v);
+  update_inputs(v);
   port_b.set_outside(i2c_data, true);
   port_b.set_outside(i2c_clock, !chip.hung);
   update_chip();

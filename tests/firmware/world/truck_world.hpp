@@ -123,6 +123,7 @@ class TruckWorld {
   Vehicle vehicle;
   SensorFaults sensors;
   std::function<void()> each_step;
+  bool interlock = true, crashed = false, plugged = false;  ///< levels at PC5, PC13, PC3
   bool aux_fitted = true;  ///< false: the auxiliary contacts are not connected, the pins stay high
 
  private:
@@ -135,6 +136,7 @@ class TruckWorld {
   void update_held_cells();
   void update_lateness();
   void update_auxiliary(unsigned pin, double pin_v, double vdda_v);
+  void update_inputs(const plant::PinVoltages& v);
 
   WorldSetup setup_;
   WorldI2c i2c_;

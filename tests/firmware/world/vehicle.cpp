@@ -51,7 +51,13 @@ constexpr std::array names{"cell overvoltage warning",
                            "charge limit exceeded",
                            "discharge limit exceeded",
                            "limit not obeyed",
-                           "supply dip"};
+                           "supply dip",
+                           "thermistor shorted",
+                           "second current missing",
+                           "interlock open",
+                           "crash",
+                           "insulation low",
+                           "insulation unknown"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
                         pack_state_id = 0x180, board_id = 0x1B9;
 constexpr double request_period_ms = 1'000;

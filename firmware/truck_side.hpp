@@ -1,0 +1,63 @@
+// The truck around the battery: its inputs, its heater, fan and lamp, its insulation, its second current sensor.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "firmware/current_referee.hpp"
+#include "firmware/hardware_inputs.hpp"
+#include "firmware/insulation_monitor.hpp"
+#include "firmware/truck_outputs.hpp"
+
+namespace bms::firmware {
+
+class TruckSide {
+ public:
+  /// Call once per sample. fitted: bits of parameters::Parameter::inputs_fitted.
+  Losses read(std::int32_t fitted, std::uint64_t now_us, BoardStatus& board, protection::ExternalInputs& inputs) {
+    const Losses losses = read_hardware(fitted, board, inputs);
+    board.insulation = insulation_.now(now_us);
+    inputs.insulation_monitored = board.insulation.fitted;
+    inputs.insulation_ohm = board.insulation.ohm;
+    return losses;
+  }
+
+  /// Returns false for a frame that is not the insulation monitor's.
+  bool receive(const can::Frame& frame, std::uint64_t now_us) { return insulation_.receive(frame, now_us); }
+
+  /// Names the wrong current sensor when they begin to contradict each other, before the contactors are open.
+  void judge_sensors(const measurement::Sample& mean, std::int32_t second_ua, const protection::Decision& decision,
+                     BoardStatus& board) {
+    if constexpr (hal::may_have_second_current) {
+      using M = can::TruckInputs;
+      if (!has(decision.faults, protection::Fault::current_sensors_differ)) {
+        referee_.update(mean, second_ua);
+        board.wrong_current_sensor = M::wrong_current_sensor_none;
+      } else if (board.wrong_current_sensor == M::wrong_current_sensor_none) {
+        board.wrong_current_sensor = referee_.verdict();
+      }
+    }
+  }
+
+  void switch_outputs(const std::array<std::int16_t, measurement::max_temperatures>& cdegc, std::int32_t soc_ppb,
+                      bool charger_present, std::uint64_t now_us, const protection::Decision& decision,
+                      const protection::ProtectionPlan& plan, BoardStatus& board) {
+    if constexpr (hal::fitted_outputs != 0) {
+      board.truck_outputs = outputs_.update({.cdegc = cdegc,
+                                             .soc_ppb = soc_ppb,
+                                             .charger_present = charger_present,
+                                             .requested = decision.state != protection::ContactorState::off,
+                                             .opens = (decision.faults & (plan.open | plan.open_now)) != 0,
+                                             .now_us = now_us},
+                                            plan);
+      hal::truck_outputs_set(board.truck_outputs);
+    }
+  }
+
+ private:
+  InsulationMonitor<hal::insulation_monitor> insulation_;
+  TruckOutputs outputs_;
+  CurrentReferee referee_;
+};
+
+}  // namespace bms::firmware

@@ -1,0 +1,7 @@
+#include "hal/insulation.hpp"
+
+namespace bms::hal {
+
+Insulation insulation() { return {}; }
+
+}  // namespace bms::hal
