@@ -193,6 +193,7 @@ void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer
     why = surroundings_.at_rest() ? receiver_.prepare() : Refusal::not_at_rest;
   } else if (which == 0xFF01) {
     if (!exited_) return answer.reject(wrong_order);
+    if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
     exited_ = false;
     why = receiver_.finish();
   } else {
@@ -228,6 +229,8 @@ void UpdateServer::transfer(std::span<const std::uint8_t> request, Answer& answe
     case 0x36: {
       if (!download_) return answer.reject(wrong_order);
       if (request.size() < 3) return answer.reject(wrong_length);
+      // A drive always comes first. What was received stays: the transfer goes on when the truck rests again.
+      if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
       if (blocks_ > 0 &&
           request[1] == static_cast<std::uint8_t>(blocks_)) {  // the answer was lost: sent again, written once
         answer.put(request[1]);
