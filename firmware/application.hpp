@@ -18,6 +18,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "firmware/access.hpp"
 #include "firmware/board_parameters.hpp"
+#include "firmware/board_updates.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/parameter_commands.hpp"
@@ -82,7 +83,7 @@ class Application {
     if constexpr (has_parameters) board_.parameters_lost = Board::parameters().lost();
     const Result estimate = Board::step(estimator_, mean);
     hal::record_estimate(estimator::words(estimate));
-    const auto request = requested_.power.active(vehicle_profile_.charger(pack.time_us), pack.time_us);
+    const auto request = allowed<Board>(requested_.power.active(vehicle_profile_.charger(pack.time_us), pack.time_us));
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
@@ -100,6 +101,8 @@ class Application {
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();
+    serve_update<Board>(pack, request == protection::Request::none && !protection_.decision().outputs.any_closed(),
+                        !board_.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
   }
 
   /// Stores the state when the battery is switched off. The last call.

@@ -18,7 +18,7 @@ struct FilterBank {
 constexpr std::uint32_t filter_of(std::uint16_t id) { return static_cast<std::uint32_t>(id) << 5; }
 
 /// CAN1 has the first 14 of the 28 banks by default (CAN_FMR, CAN2SB).
-inline constexpr std::size_t ids_per_bank = 4, max_ids = 14 * ids_per_bank;
+inline constexpr std::size_t banks = 14, ids_per_bank = 4, max_ids = banks * ids_per_bank;
 
 /// Returns true if the banks have room for all identifiers, and each has 11 bits.
 constexpr bool fits(std::span<const std::uint16_t> ids) {

@@ -31,6 +31,7 @@
 #include "hal/clock.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
+#include "hal/update_frames.hpp"
 
 namespace bms::hal {
 
@@ -38,7 +39,11 @@ namespace {
 
 using namespace stm32f4;
 
-static_assert(bxcan::fits(request_ids) && bxcan::fits(request_and_sample_ids));
+/// Lists and masks together have room in the banks.
+constexpr bool fit(std::span<const std::uint16_t> ids) {
+  return bxcan::fits(ids) && bxcan::bank_count(ids) + long_ids.size() <= bxcan::banks;
+}
+static_assert(fit(with_updates(request_ids)) && fit(with_updates(request_and_sample_ids)));
 
 struct Rate {
   std::uint32_t bit_rate, btr, phase_timeout_us;
