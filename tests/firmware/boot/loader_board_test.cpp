@@ -65,13 +65,30 @@ void no_code(std::string& payload, std::uint8_t) {
   payload.replace(4'096, payload.size() - 4'096, std::string(payload.size() - 4'096, '\0'));
 }
 
-class BadImage : public ::testing::TestWithParam<Bad> {};
+using Board = firmware::UnicornBoard;
+constexpr Board::Instructions spins{0xE7FE, 0xE7FE};  // b to itself
+const Bad bad_images[] = {
+    {"hangs at its first instruction", patched("reset_handler", spins), 16},
+    {"faults at its first instruction", patched("reset_handler", Board::undefined), 16},
+    {"has no stack", wrong_stack, 16},
+    {"begins where no code is", wrong_entry, 16},
+    {"has only zeros behind its first block", no_code, 16},
+    {"hangs in main()", patched("bms::hal::clock_start()", spins), 16},
+    {"faults when it starts the bus", patched("bms::hal::can_start(", Board::undefined), 16},
+    {"faults with its first sample", patched("bms::firmware::estimator_step(", Board::undefined), 16},
+    {"estimates nothing", patched("bms::firmware::estimator_step(", Board::returns), 16},
+    {"never sends", patched("bms::hal::can_listening()", Board::returns), 75},
+    {"does not see what it measures", patched("bms::hal::can_receive(", Board::returns), 75},
+};
+
+class BadImage : public ::testing::TestWithParam<int> {};
 
 /// The longest time of the watchdog that the loader starts is 8 s at 17 kHz: 15 s.
 TEST_P(BadImage, IsReplacedByTheOldOne) {
+  const Bad& bad = bad_images[GetParam()];
   LoaderBoard battery;
   battery.board.longest_sleep_us = 500;
-  battery.put_on_trial(container(1, 0x000300, GetParam().change));
+  battery.put_on_trial(container(1, 0x000300, bad.change));
   ASSERT_TRUE(battery.run_until([&] { return battery.marks(1).trials == 1; }, 2'000));
   const double began_ms = battery.board.now_ms();
   const auto measured_until = [&](const std::function<bool()>& becomes) {
@@ -80,8 +97,8 @@ TEST_P(BadImage, IsReplacedByTheOldOne) {
       return becomes();
     };
   };
-  ASSERT_TRUE(battery.run_until(measured_until([&] { return battery.running() == 0; }), 1e3 * GetParam().within_s));
-  std::printf("%s: the old one after %.2f s\n", GetParam().what, 1e-3 * (battery.board.now_ms() - began_ms));
+  ASSERT_TRUE(battery.run_until(measured_until([&] { return battery.running() == 0; }), 1e3 * bad.within_s));
+  std::printf("%s: the old one after %.2f s\n", bad.what, 1e-3 * (battery.board.now_ms() - began_ms));
   EXPECT_TRUE(battery.marks(1).rejected);
   EXPECT_FALSE(battery.marks(1).confirmed);
   battery.board.reset(by_software);
@@ -89,21 +106,7 @@ TEST_P(BadImage, IsReplacedByTheOldOne) {
   EXPECT_EQ(battery.running(), 0) << "and it stays";
 }
 
-using Board = firmware::UnicornBoard;
-constexpr Board::Instructions spins{0xE7FE, 0xE7FE};  // b to itself
-INSTANTIATE_TEST_SUITE_P(
-    InTenWays, BadImage,
-    ::testing::Values(Bad{"hangs at its first instruction", patched("reset_handler", spins), 16},
-                      Bad{"faults at its first instruction", patched("reset_handler", Board::undefined), 16},
-                      Bad{"has no stack", wrong_stack, 16}, Bad{"begins where no code is", wrong_entry, 16},
-                      Bad{"has only zeros behind its first block", no_code, 16},
-                      Bad{"hangs in main()", patched("bms::hal::clock_start()", spins), 16},
-                      Bad{"faults when it starts the bus", patched("bms::hal::can_start(", Board::undefined), 16},
-                      Bad{"faults with its first sample", patched("bms::firmware::estimator_step(", Board::undefined),
-                          16},
-                      Bad{"estimates nothing", patched("bms::firmware::estimator_step(", Board::returns), 16},
-                      Bad{"never sends", patched("bms::hal::can_listening()", Board::returns), 75},
-                      Bad{"does not see what it measures", patched("bms::hal::can_receive(", Board::returns), 75}));
+INSTANTIATE_TEST_SUITE_P(InElevenWays, BadImage, ::testing::Range(0, static_cast<int>(std::size(bad_images))));
 
 TEST(LoaderBoard, OfLossesOfPowerInEveryPartOfAStartOneImageAlwaysRuns) {
   std::mt19937 random(7);
