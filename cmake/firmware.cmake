@@ -9,6 +9,7 @@
 #   bms_<board>_pack.elf        tests/firmware/pack_image.cpp, built on request
 #   bms_<board>_filter_forms.elf  tests/firmware/filter_forms_image.cpp, built on request, needs Eigen
 #   bms_<board>_protection.elf  tests/firmware/protection_image.cpp, built on request
+#   bms_<board>_loader.elf      the boot loader (loader.cmake), built on request
 #   bms_<board>_remote_product.elf  the remote image as BMS_PRODUCTION=ON builds it, built on request
 #
 # A board that QEMU emulates (BMS_EMULATED ON) has all but the remote image. Another board has the first two, and the
@@ -292,9 +293,21 @@ set(parameters "")
 if(BMS_PARAMETERS)
   set(parameters ${root}/firmware/board_parameters.cpp)
 endif()
-bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${parameters}
+# BMS_SLOT=a or b: the application is linked for a slot of the boot loader (firmware/boot/flash_map.hpp), behind the
+# header of its container, and receives updates. Without it the image starts by itself at every reset.
+set(BMS_SLOT "" CACHE STRING "slot of the boot loader: a or b; empty: an image without a loader")
+set(updates "")
+set(in_slot false)
+if(BMS_SLOT)
+  set(in_slot true)
+  set(updates ${root}/firmware/update_service.cpp)
+endif()
+bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cell.cpp ${parameters} ${updates}
   ${generated_headers})
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
+foreach(objects application estimator_step)
+  target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_BOARD="${BMS_BOARD}")
+endforeach()
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
   OUTPUT_FORMAT HEXADECIMAL)
 target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
@@ -302,9 +315,6 @@ target_compile_definitions(estimator_step PRIVATE BMS_VERSION=${version})
 # bms_image(NAME OBJECTS...)
 # The linker uses the first copy of a function that several objects have: estimator_step, compiled for speed, comes
 # before the objects compiled for size.
-# BMS_SLOT=a or b: the application is linked for a slot of the boot loader (firmware/boot/flash_map.hpp), behind the
-# header of its container. Without it the image starts by itself at every reset.
-set(BMS_SLOT "" CACHE STRING "slot of the boot loader: a or b; empty: an image without a loader")
 set(linker_script ${BMS_LINKER_SCRIPT})
 if(BMS_SLOT)
   set(slot_a 0x08020800)
@@ -343,12 +353,18 @@ function(bms_image name)
     LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${build})
 endfunction()
 
+if(BMS_CHIP STREQUAL stm32f4)
+  include(${root}/cmake/loader.cmake)
+endif()
 set(on_chip hal_core hal_clock hal_chip hal_board)
 set(program estimator_step storage application)
 set(portable ${program} ${image_kind})
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${portable})
-  bms_image(bms_${BMS_BOARD}_remote ${on_chip} hal_remote_samples ${portable})
+  bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${portable} ${of_a_slot})
+  bms_image(bms_${BMS_BOARD}_remote ${on_chip} hal_remote_samples ${portable} ${of_a_slot})
+  if(BMS_SLOT)
+    return()
+  endif()
   bms_image(bms_${BMS_BOARD}_remote_product ${on_chip} hal_remote_samples ${program} product_image)
   set_target_properties(bms_${BMS_BOARD}_remote_product PROPERTIES EXCLUDE_FROM_ALL ON)
   foreach(image bms_${BMS_BOARD} bms_${BMS_BOARD}_remote bms_${BMS_BOARD}_remote_product)
@@ -359,7 +375,11 @@ if(NOT BMS_EMULATED)
   bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
   return()
 endif()
-bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples ${portable})
+bms_image(bms_${BMS_BOARD} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples ${portable}
+  ${of_a_slot})
+if(BMS_SLOT)
+  return()
+endif()
 bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream ${portable})
 bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
 bms_image(bms_${BMS_BOARD}_bench ${on_chip} hal_samples ${portable})

@@ -18,6 +18,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "firmware/access.hpp"
 #include "firmware/board_parameters.hpp"
+#include "firmware/board_updates.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/parameter_commands.hpp"
@@ -84,8 +85,8 @@ class Application {
     protection::ExternalInputs inputs;
     const Losses losses = truck_.read(fitted_inputs(), pack.time_us, board_, inputs);
     const ChargerState charger = with_plug(vehicle_profile_.charger(pack.time_us), board_.truck);
-    inputs.request = requested_.power.active(charger, pack.time_us,
-                                             hal::closes_by_inputs && board_.truck.is_on(hal::TruckInput::key));
+    inputs.request = allowed<Board>(requested_.power.active(
+        charger, pack.time_us, hal::closes_by_inputs && board_.truck.is_on(hal::TruckInput::key)));
     Board::update_condition(condition_, estimator_, mean, estimate,
                             hal::can_listening() || inputs.request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
@@ -110,6 +111,8 @@ class Application {
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();
+    serve_update<Board>(pack, request == protection::Request::none && !protection_.decision().outputs.any_closed(),
+                        !board_.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
   }
 
   /// Stores the state when the battery is switched off. The last call.

@@ -15,6 +15,7 @@
 #include "firmware/elcon_profile.hpp"
 #include "firmware/j1939_profile.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/update_service.hpp"
 #include "hal/samples.hpp"
 #include "protection/protection.hpp"
 namespace bms::firmware {
@@ -49,7 +50,7 @@ struct ProfileOf<hal::VehicleProfile::elcon> {
 using BoardVehicleProfile = ProfileOf<hal::vehicle_profile>::Type;
 
 /// The application's Board (firmware/application.hpp).
-struct BoardCell : ParametersOfBoard<hal::has_parameters> {
+struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_SLOT> {
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
 

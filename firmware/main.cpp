@@ -36,6 +36,12 @@ bms::hal::CanSettings can_settings() {
   return bms::hal::can_settings_of_build;
 }
 
+template <class Board>
+void start_updates(const bms::storage::Persistence& persistence) {
+  if constexpr (requires { Board::update(); })
+    Board::update().start(persistence.events().starts, persistence.charge().operating_s);
+}
+
 using BoardApplication = bms::firmware::Application<BoardCell, bms::firmware::BoardVehicleProfile>;
 BoardApplication* running = nullptr;
 
@@ -56,6 +62,7 @@ int main() {
   persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s(), hal::retained_ram());
   hal::calibrate(start_parameters<BoardCell>(persistence));
   hal::can_start(can_settings<BoardCell>());
+  start_updates<BoardCell>(persistence);
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;
   const auto given_start = hal::starting_point();

@@ -10,6 +10,10 @@ Refusal Receiver::prepare() {
     if (!read_marks(flash_, running_).confirmed) return Refusal::not_confirmed;
     if (!confirm(flash_, running_, 0)) return Refusal::flash_failed;
   }
+  if (!flash_.erases_now()) {
+    if (read_marks(flash_, target()).erased) return Refusal::none;
+    return ask_for_erase(flash_, target()) ? Refusal::erase_at_restart : Refusal::flash_failed;
+  }
   return boot::prepare(flash_, target()) ? Refusal::none : Refusal::flash_failed;
 }
 
@@ -44,7 +48,7 @@ Refusal Receiver::take(std::span<const std::uint8_t> bytes) {
 }
 
 Refusal Receiver::header_complete() {
-  if (const Refusal r = check_header(header_room_, battery_, target(), header_); r != Refusal::none) return r;
+  if (const Refusal r = check_(header_room_, battery_, target(), header_); r != Refusal::none) return r;
   if (header_.payload_bytes + header_bytes != expected_) return Refusal::incomplete;
   header_digest_ = sha256(header_room_);
   if (running_ < 2) {
@@ -78,7 +82,7 @@ Refusal Receiver::finish() {
   if (!active_ || received_ != expected_) return refuse(Refusal::incomplete);
   active_ = false;
   Header header;
-  if (const Refusal r = check_slot(flash_, battery_, target(), header); r != Refusal::none) return r;
+  if (const Refusal r = check_slot(flash_, battery_, target(), header, check_); r != Refusal::none) return r;
   return complete(flash_, target()) ? Refusal::none : Refusal::flash_failed;
 }
 

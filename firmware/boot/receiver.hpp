@@ -11,12 +11,14 @@ namespace bms::boot {
 
 class Receiver {
  public:
-  /// running: the slot that may not be written; 2 if none runs.
-  Receiver(SlotFlash& flash, const Battery& battery, std::uint8_t running)
-      : flash_(flash), battery_(battery), running_(running) {}
+  /// running: the slot that may not be written; 2 if none runs. check: check_header, or check_fields_and_key in an
+  /// image that leaves the signature to the loader.
+  Receiver(SlotFlash& flash, const Battery& battery, std::uint8_t running, HeaderCheck* check = check_header)
+      : flash_(flash), battery_(battery), running_(running), check_(check) {}
 
   std::uint8_t target() const { return running_ == 0 ? 1 : 0; }
-  /// Erases the target. Takes seconds. Refuses while the running image is on trial.
+  /// Erases the target, which takes seconds, or asks the loader for it: erase_at_restart. A slot that is erased already
+  /// stays as it is. Refuses while the running image is on trial.
   Refusal prepare();
   /// Begins a transfer of container bytes from the start. Refuses a slot that is not erased.
   Refusal begin(std::uint32_t container_bytes);
@@ -43,6 +45,7 @@ class Receiver {
   SlotFlash& flash_;
   const Battery& battery_;
   std::uint8_t running_;
+  HeaderCheck* check_;
   bool active_ = false;
   std::uint32_t expected_ = 0, received_ = 0;
   Header header_{};

@@ -33,10 +33,11 @@ enum class Refusal : std::uint8_t {
   not_from_the_other_slot,
   other_kind,
   not_confirmed,
+  erase_at_restart,
 };
 
 /// For a person, in the order of Refusal.
-inline constexpr std::array<std::string_view, 23> refusal_words{
+inline constexpr std::array<std::string_view, 24> refusal_words{
     "accepted",
     "this is not an image of this format",
     "the image's header is inconsistent",
@@ -60,6 +61,7 @@ inline constexpr std::array<std::string_view, 23> refusal_words{
     "the image would overwrite the running one",
     "this slot holds another kind of data",
     "the running image is still on trial; wait until it has confirmed itself",
+    "the battery restarts to erase the slot; it continues afterwards",
 };
 
 constexpr std::string_view words_for(Refusal refusal) {

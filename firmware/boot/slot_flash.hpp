@@ -13,6 +13,8 @@ namespace bms::boot {
 class SlotFlash {
  public:
   virtual std::uint32_t slot_bytes() const = 0;
+  /// Returns false if only the loader may erase, because an erase stops the core for seconds.
+  virtual bool erases_now() const { return true; }
   /// Each returns false if the chip reports an error.
   virtual bool erase(std::uint8_t slot) = 0;
   virtual bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) = 0;  ///< at: a multiple of 4

@@ -9,9 +9,9 @@ namespace {
 // Places of the marks, from the end of the slot. Values with as many zeros as ones: an erase or a programming that was
 // interrupted does not produce them from erased or cleared words.
 constexpr std::uint32_t erased_at = 64, sequence_at = 60, complete_at = 56, confirmed_at = 52, rejected_at = 48,
-                        first_trial_at = 44;
+                        first_trial_at = 44, erase_asked_at = 28;
 constexpr std::uint32_t erased_mark = 0x96A5'3C1E, complete_mark = 0xC35A'69E1, confirmed_mark = 0x5AC3'961E,
-                        rejected_mark = 0x3CA5'69D2, trial_mark = 0xA53C'D296;
+                        rejected_mark = 0x3CA5'69D2, trial_mark = 0xA53C'D296, erase_asked_mark = 0x69D2'A53C;
 
 std::uint32_t word_at(SlotFlash& flash, std::uint8_t slot, std::uint32_t from_end) {
   std::array<std::uint8_t, 4> bytes{};
@@ -52,10 +52,10 @@ Marks read_marks(SlotFlash& flash, std::uint8_t slot) {
   return m;
 }
 
-Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, Header& header) {
+Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, Header& header, HeaderCheck* check) {
   HeaderBytes bytes{};
   flash.read(slot, 0, bytes);
-  if (const Refusal r = check_header(bytes, battery, slot, header); r != Refusal::none) return r;
+  if (const Refusal r = check(bytes, battery, slot, header); r != Refusal::none) return r;
   std::array<std::uint8_t, 256> part{};
   for (std::uint32_t block = 0; block < header.blocks(); ++block) {
     Sha256 hash;
@@ -82,7 +82,7 @@ Start choose(SlotFlash& flash, const Battery& battery, bool power_on) {
       start.returned = true;
       refusal = Refusal::trial_failed;
     }
-    if (refusal == Refusal::none) refusal = check_slot(flash, battery, slot, start.header);
+    if (refusal == Refusal::none) refusal = check_slot(flash, battery, slot, start.header, check_header);
     if (refusal == Refusal::none) {
       settle(flash, slot, m, start.header);
       start.trial = !m.confirmed;
@@ -104,6 +104,17 @@ bool prepare(SlotFlash& flash, std::uint8_t slot) {
   // 0 may be programmed over any word. An erase that is interrupted does not bring back what was cleared before.
   if (!set(flash, slot, complete_at, 0) || !set(flash, slot, erased_at, 0) || !flash.erase(slot)) return false;
   return set(flash, slot, erased_at, erased_mark);
+}
+
+bool ask_for_erase(SlotFlash& flash, std::uint8_t slot) {
+  return set(flash, slot, complete_at, 0) && set(flash, slot, erased_at, 0) &&
+         set(flash, slot, erase_asked_at, erase_asked_mark);
+}
+
+bool erase_if_asked(SlotFlash& flash, std::uint8_t slot) {
+  if (word_at(flash, slot, erase_asked_at) != erase_asked_mark || read_marks(flash, slot).complete) return false;
+  prepare(flash, slot);
+  return true;
 }
 
 bool begin_writing(SlotFlash& flash, std::uint8_t slot) { return set(flash, slot, erased_at, 0); }

@@ -33,8 +33,8 @@ struct Marks {
 
 Marks read_marks(SlotFlash& flash, std::uint8_t slot);
 
-/// Checks header, signature and every block of a slot, without its marks.
-Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, Header& header);
+/// Checks header, signature (with check_header) and every block of a slot, without its marks.
+Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, Header& header, HeaderCheck* check);
 
 struct Start {
   bool found = false;  ///< otherwise no image may run: the loader waits for a transfer
@@ -55,6 +55,12 @@ bool confirm(SlotFlash& flash, std::uint8_t slot, std::uint32_t security_version
 
 /// Erases a slot after its marks were cleared, and marks it as erased only when the erase has ended.
 bool prepare(SlotFlash& flash, std::uint8_t slot);
+/// Asks the loader to erase a slot at the next start: what an image does that cannot erase while it protects. The slot
+/// is no longer usable.
+bool ask_for_erase(SlotFlash& flash, std::uint8_t slot);
+/// Called by the loader for the slot that it does not start. Returns true if an erase was asked for; it was then tried.
+/// An interrupted erase has to be asked for again.
+bool erase_if_asked(SlotFlash& flash, std::uint8_t slot);
 /// Called before the first block is written: the slot no longer counts as erased.
 bool begin_writing(SlotFlash& flash, std::uint8_t slot);
 /// Called after the content was checked: the slot is the newer one from now on.

@@ -159,6 +159,7 @@ void UpdateServer::read(std::span<const std::uint8_t> request, Answer& answer) c
       answer.put(started_.found ? started_.slot : 0xFF).put(started_.trial).put(started_.returned);
       answer.put(started_.header.version, 4).put(started_.header.cell_hash, 4).put(battery_.security_counter, 4);
       answer.put(battery_.loader_version, 4).put(receiver_.active() ? receiver_.received() : 0, 4);
+      answer.put((started_.header.development() ? 1U : 0U) | (battery_.product ? 0U : 2U));
       return;
     case 0xF1A4:
       answer.put(static_cast<std::uint8_t>(refusal_));
@@ -193,13 +194,15 @@ void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer
     why = surroundings_.at_rest() ? receiver_.prepare() : Refusal::not_at_rest;
   } else if (which == 0xFF01) {
     if (!exited_) return answer.reject(wrong_order);
+    if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
     exited_ = false;
     why = receiver_.finish();
   } else {
     return answer.reject(out_of_range);
   }
-  if (why != Refusal::none) return refuse(answer, why);
-  answer.put(0);
+  restart_ = why == Refusal::erase_at_restart;
+  if (why != Refusal::none && !restart_) return refuse(answer, why);
+  answer.put(restart_ ? 1 : 0);
 }
 
 void UpdateServer::request_download(std::span<const std::uint8_t> request, Answer& answer) {
@@ -228,6 +231,8 @@ void UpdateServer::transfer(std::span<const std::uint8_t> request, Answer& answe
     case 0x36: {
       if (!download_) return answer.reject(wrong_order);
       if (request.size() < 3) return answer.reject(wrong_length);
+      // A drive always comes first. What was received stays: the transfer goes on when the truck rests again.
+      if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
       if (blocks_ > 0 &&
           request[1] == static_cast<std::uint8_t>(blocks_)) {  // the answer was lost: sent again, written once
         answer.put(request[1]);

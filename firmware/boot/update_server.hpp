@@ -5,7 +5,9 @@
 //   27 security access    01: challenge of 6 bytes; 02: operator (2), session_code (4) of
 //                         firmware/authentication/codes.hpp; a challenge of 0: no key, nothing to prove
 //   22 read               F1A0 board, F1A1 state, F1A4 last refusal (1)
-//   31 routine, 01 start  FF00 erase the target slot; 0203 resume: digest of the header (32), returns the
+//   31 routine, 01 start  FF00 erase the target slot, returns 0, or 1 if the battery restarts for it and the tool has
+//   to
+//                         ask again; 0203 resume: digest of the header (32), returns the
 //                         bytes received; FF01 check the slot and make it the next to start
 //   34 request download   00 44 address (4) size (4): the target slot from its begin on, or from where it stopped
 //   36 transfer data      sequence, at most 1,024 bytes
@@ -41,8 +43,9 @@ class UpdateSurroundings {
 };
 
 /// What runs, as 22 F1A1 sends it: running slot (0xFF: none), trial (1), last start returned (1), version (4), cell
-/// hash (4), security counter (4), loader version (4), bytes received (4).
-inline constexpr std::size_t state_record_bytes = 23;
+/// hash (4), security counter (4), loader version (4), bytes received (4), development (1: the image, 2: the loader
+/// accepts such images).
+inline constexpr std::size_t state_record_bytes = 24;
 
 class UpdateServer {
  public:
@@ -50,12 +53,14 @@ class UpdateServer {
   static constexpr unsigned most_wrong_keys = 3;
 
   UpdateServer(SlotFlash& flash, const Battery& battery, const Start& started,
-               const std::optional<authentication::Key>& service_key, UpdateSurroundings& surroundings)
-      : receiver_(flash, battery, started.found ? started.slot : 2),
+               const std::optional<authentication::Key>& service_key, UpdateSurroundings& surroundings,
+               HeaderCheck* check = check_header)
+      : receiver_(flash, battery, started.found ? started.slot : 2, check),
         battery_(battery),
         started_(started),
         key_(service_key),
-        surroundings_(surroundings) {}
+        surroundings_(surroundings),
+        refusal_(started.refusal) {}
 
   /// Returns the answer, empty if none is to be sent. `room` has at least longest_answer bytes.
   static constexpr std::size_t longest_answer = 64;
@@ -65,6 +70,8 @@ class UpdateServer {
   static bool takes_long(std::span<const std::uint8_t> request);
   /// Returns true once after an accepted reset; the caller sends the answer and calls restart().
   bool restart_due() const { return restart_; }
+  /// The image has confirmed itself: it is on trial no longer.
+  void confirmed() { started_.trial = false; }
   Refusal last_refusal() const { return refusal_; }
   const Receiver& receiver() const { return receiver_; }
 
@@ -88,7 +95,7 @@ class UpdateServer {
   std::uint64_t since_us_ = 0, challenge_ = 0, locked_since_us_ = 0;
   unsigned wrong_ = 0;
   std::uint32_t blocks_ = 0;  ///< of this download
-  Refusal refusal_ = Refusal::none;
+  Refusal refusal_;           ///< at first that of the start: why the newest image does not run
 };
 
 /// Server and transport together: frames in, frames out.

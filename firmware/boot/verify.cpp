@@ -24,8 +24,8 @@ Refusal check_fields(const Header& header, const Battery& battery, std::uint8_t 
   return Refusal::none;
 }
 
-Refusal check_header(std::span<const std::uint8_t, header_bytes> bytes, const Battery& battery, std::uint8_t slot,
-                     Header& header) {
+Refusal check_fields_and_key(std::span<const std::uint8_t, header_bytes> bytes, const Battery& battery,
+                             std::uint8_t slot, Header& header) {
   if (const Refusal r = read_header(bytes, header); r != Refusal::none) return r;
   if (const Refusal r = check_fields(header, battery, slot); r != Refusal::none) return r;
   const TrustedKey* const key = find_key(battery, header.key);
@@ -33,6 +33,13 @@ Refusal check_header(std::span<const std::uint8_t, header_bytes> bytes, const Ba
   if (key->revoked) return Refusal::revoked_key;
   // A development key signs development images only, so that no leaked one makes a product's image.
   if (key->development && (!header.development() || battery.product)) return Refusal::development_image;
+  return Refusal::none;
+}
+
+Refusal check_header(std::span<const std::uint8_t, header_bytes> bytes, const Battery& battery, std::uint8_t slot,
+                     Header& header) {
+  if (const Refusal r = check_fields_and_key(bytes, battery, slot, header); r != Refusal::none) return r;
+  const TrustedKey* const key = find_key(battery, header.key);
   if (!signature_right(key->point, sha256(bytes.first<signed_bytes>()), stated_signature(bytes)))
     return Refusal::bad_signature;
   return Refusal::none;

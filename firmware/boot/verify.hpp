@@ -32,7 +32,12 @@ struct Battery {
 Refusal check_header(std::span<const std::uint8_t, header_bytes> bytes, const Battery& battery, std::uint8_t slot,
                      Header& header);
 
-/// The same without the signature.
+/// The same without the signature: for an image that leaves it to the loader, which starts nothing without it.
+Refusal check_fields_and_key(std::span<const std::uint8_t, header_bytes> bytes, const Battery& battery,
+                             std::uint8_t slot, Header& header);
+using HeaderCheck = decltype(check_header);
+
+/// The fields only.
 Refusal check_fields(const Header& header, const Battery& battery, std::uint8_t slot);
 
 }  // namespace bms::boot

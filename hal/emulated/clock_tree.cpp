@@ -10,6 +10,7 @@ constexpr Clocks fixed{168'000'000, 84'000'000};
 }  // namespace
 
 Clocks start_clocks() { return fixed; }
+void stop_clocks() {}
 const Clocks& clocks() { return fixed; }
 
 }  // namespace bms::hal::stm32f4

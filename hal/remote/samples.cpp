@@ -12,6 +12,7 @@
 #include "hal/frame_dispatch.hpp"
 #include "hal/power_path.hpp"
 #include "hal/sample_frames.hpp"
+#include "hal/update_frames.hpp"
 
 namespace bms::hal {
 
@@ -59,7 +60,10 @@ const measurement::PackSample<pack_cells>* next_sample() {
 
 std::uint32_t acquisition_us() { return 0; }
 std::optional<measurement::StartingPoint> starting_point() { return frames.starting_point(); }
-std::span<const std::uint16_t> accepted_ids() { return request_and_sample_ids; }
+std::span<const std::uint16_t> accepted_ids() {
+  static constexpr auto ids = with_updates(request_and_sample_ids);
+  return ids;
+}
 void power_path_set(const PowerPath&) {}
 LinkVoltages link_voltages() { return {frames.link_plus_uv(), frames.link_minus_uv()}; }
 

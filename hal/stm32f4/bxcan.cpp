@@ -31,6 +31,7 @@
 #include "hal/clock.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
+#include "hal/update_frames.hpp"
 
 namespace bms::hal {
 
@@ -38,7 +39,8 @@ namespace {
 
 using namespace stm32f4;
 
-static_assert(bxcan::fits(request_ids, long_ids.size()) && bxcan::fits(request_and_sample_ids, long_ids.size()),
+static_assert(bxcan::fits(with_updates(request_ids), long_ids.size()) &&
+                  bxcan::fits(with_updates(request_and_sample_ids), long_ids.size()),
               "too many identifiers for the acceptance filters of CAN1");
 
 struct Rate {

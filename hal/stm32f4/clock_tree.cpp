@@ -47,6 +47,19 @@ Clocks start_clocks() {
   return reached = crystal_and_pll;
 }
 
+void stop_clocks() {
+  constexpr std::uint32_t pllcfgr_after_reset = 0x2400'3010, hse_security_and_pll_on = 1U << 16 | 1U << 19 | 1U << 24;
+  rcc_cfgr() = 0;
+  if (!wait_for(rcc_cfgr(), 3U << 2, 0)) return;
+  rcc_cr() = rcc_cr() & ~hse_security_and_pll_on;
+  if (!wait_for(rcc_cr(), 1U << 25, 0)) return;
+  rcc_pllcfgr() = pllcfgr_after_reset;
+  flash_acr() = 0;
+  flash_acr() = 3U << 11;  // both caches are reset, which works only while they are off (3.9.1)
+  flash_acr() = 0;
+  reached = internal_oscillator;
+}
+
 const Clocks& clocks() { return reached; }
 
 }  // namespace bms::hal::stm32f4

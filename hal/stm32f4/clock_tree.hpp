@@ -17,6 +17,9 @@ inline constexpr std::uint32_t crystal_core_hz = 168'000'000, crystal_apb1_hz = 
 /// PLL do not start.
 Clocks start_clocks();
 
+/// Back to the internal oscillator, as after a reset, for an image that starts the clocks itself.
+void stop_clocks();
+
 /// Result of start_clocks(); before it, the internal oscillator.
 const Clocks& clocks();
 

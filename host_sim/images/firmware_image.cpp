@@ -56,7 +56,11 @@ void run_step(const std::vector<std::string>& argv, const std::filesystem::path&
 const char* ending(Image image) {
   switch (image) {
     case Image::remote:
+    case Image::remote_slot_a:
+    case Image::remote_slot_b:
       return "_remote";
+    case Image::loader:
+      return "_loader";
     case Image::remote_product:
       return "_remote_product";
     case Image::replay:
@@ -73,6 +77,19 @@ const char* ending(Image image) {
       return "_pack";
     case Image::protection:
       return "_protection";
+    default:
+      return "";
+  }
+}
+
+const char* slot_of(Image image) {
+  switch (image) {
+    case Image::slot_a:
+    case Image::remote_slot_a:
+      return "a";
+    case Image::slot_b:
+    case Image::remote_slot_b:
+      return "b";
     default:
       return "";
   }
@@ -186,13 +203,16 @@ std::filesystem::path firmware_image(const SourceTree& sources, const std::strin
   const Variant variant{board, vehicle_profile, other_cells ? cells : 0};
   const std::string image_name = fmt::format("bms_{}{}", board, ending(image));
   const auto shared = shared_objects(sources, variant, image_name);
-  const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}", board, cell.name, cell.hash, variant.ending()));
+  const std::string slot = slot_of(image);
+  const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}{}", board, cell.name, cell.hash, variant.ending(),
+                                                slot.empty() ? "" : "-slot_" + slot));
   const auto cell_path = folder.path() / "cell.toml";
   if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
     files::write_file(cell_path, cell.text);
   if (folder.is_new()) {
     if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
-    folder.configure(variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string()});
+    folder.configure(
+        variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(), "-DBMS_SLOT=" + slot});
   }
   folder.build(image_name + ".elf");
   return folder.path() / (image_name + ".elf");

@@ -11,8 +11,25 @@
 
 namespace bms::images {
 
-/// Purpose of an image: the end of its name after "bms_<board>" (cmake/firmware.cmake).
-enum class Image { application, remote, remote_product, replay, hil, bench, fault, pack, protection, filter_forms };
+/// Purpose of an image: the end of its name after "bms_<board>" (cmake/firmware.cmake). slot_a to remote_slot_b are the
+/// application and the remote image, linked for a slot of the boot loader (BMS_SLOT).
+enum class Image {
+  application,
+  remote,
+  remote_product,
+  replay,
+  hil,
+  bench,
+  fault,
+  pack,
+  protection,
+  filter_forms,
+  loader,
+  slot_a,
+  slot_b,
+  remote_slot_a,
+  remote_slot_b
+};
 
 /// Builds `image` of `board` with the tables of `cell`, if it is not there yet, and returns its path. vehicle_profile:
 /// BMS_VEHICLE_PROFILE of cmake/firmware.cmake. cells: BMS_CELLS; 0 for the board's own number. Needs the source tree,

@@ -10,6 +10,7 @@
 #include "tool/options.hpp"
 #include "update/container_file.hpp"
 #include "update/linked_image.hpp"
+#include "update/loader_file.hpp"
 
 namespace bms::tool {
 
@@ -18,7 +19,7 @@ namespace {
 using update::Container;
 
 struct ImageOptions {
-  std::vector<std::string> images;
+  std::vector<std::string> images, product_keys, development_keys;
   std::string file, key, board, version, oldest_loader = "0.0.0", out;
   unsigned security = 0;
   bool development = false;
@@ -61,6 +62,18 @@ class ImageCommand final : public Command {
     CLI::App& verify = *c.add_subcommand("verify", "Check signature and hashes; exit code 1 if one is wrong");
     verify.add_option("file", o_.file, "signed images")->required()->check(not_empty());
     verify.add_option("--key", o_.key, "public or private key, PEM")->required()->check(not_empty())->type_name("FILE");
+    CLI::App& loader = *c.add_subcommand("loader", "Write the public keys of a product into its boot loader");
+    loader.add_option("file", o_.file, "bms_BOARD_loader.elf")->required()->check(not_empty());
+    loader.add_option("--key", o_.product_keys, "public keys, PEM; the second one for the roll-over")
+        ->expected(1, 4)
+        ->check(not_empty())
+        ->type_name("FILE");
+    loader
+        .add_option("--development-key", o_.development_keys, "the battery is not a product and runs such images too")
+        ->expected(1, 2)
+        ->check(not_empty())
+        ->type_name("FILE");
+    loader.add_option("--out", o_.out, "file to write")->required()->check(not_empty())->type_name("FILE");
     CLI::App& key = *c.add_subcommand("key", "Make a private key, and its public key in FILE.pub");
     key.add_option("--out", o_.out, "new file, readable for you only")
         ->required()
@@ -75,6 +88,7 @@ class ImageCommand final : public Command {
     if (what == "sign") return sign();
     if (what == "show") return show();
     if (what == "verify") return verify();
+    if (what == "loader") return loader();
     update::make_key(o_.out);
     files::write_file(o_.out + ".pub", update::public_pem(update::SigningKey(o_.out)));
     fmt::print("{}: the private key; keep it out of every repository\n{}.pub: the public key, for the loader\n", o_.out,
@@ -119,6 +133,16 @@ class ImageCommand final : public Command {
     for (const Container& c : update::sign(std::move(payloads), update::SigningKey(o_.key))) all += c.bytes;
     files::write_file(o_.out, all);
     return show(o_.out);
+  }
+
+  int loader() {
+    std::vector<update::LoaderKey> keys;
+    for (const std::string& key : o_.product_keys) keys.push_back({update::read_public_key(key), false});
+    for (const std::string& key : o_.development_keys) keys.push_back({update::read_public_key(key), true});
+    update::write_loader(o_.file, keys, o_.out);
+    fmt::print("{}: a boot loader with {} key{}{}\n", o_.out, keys.size(), keys.size() == 1 ? "" : "s",
+               o_.development_keys.empty() ? "" : ", for development");
+    return 0;
   }
 
   int show() { return show(o_.file); }

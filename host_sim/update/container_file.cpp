@@ -34,7 +34,12 @@ HeaderBytes Container::header_bytes() const {
 
 std::vector<Container> sign(std::vector<Payload> payloads, const SigningKey& key) {
   Sha256 all;
-  for (const Payload& p : payloads) all.add(bytes_of(p.bytes));
+  for (const Payload& p : payloads) {  // with what the header says: the same code as another version is another release
+    HeaderBytes header{};
+    write_header(p.header, {}, header);
+    all.add(header);
+    all.add(bytes_of(p.bytes));
+  }
   const Digest release = all.finish();
   std::vector<Container> out;
   for (Payload& p : payloads) {

@@ -1,7 +1,9 @@
 #include "update/update_run.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
+#include <thread>
 
 #include <fmt/format.h>
 
@@ -33,6 +35,29 @@ void put(Bytes& to, std::uint32_t value, std::size_t size) {
   for (std::size_t k = size; k > 0; --k) to.push_back(static_cast<std::uint8_t>(value >> 8 * (k - 1)));
 }
 
+/// Bytes behind the service that a positive answer repeats. By them a late answer to a request that was sent again is
+/// not taken for that to the next one.
+std::size_t repeated(std::uint8_t service) {
+  switch (service) {
+    case 0x31:
+      return 3;
+    case 0x22:
+      return 2;
+    case 0x10:
+    case 0x11:
+    case 0x27:
+    case 0x36:
+      return 1;
+    default:
+      return 0;
+  }
+}
+bool answers(const Bytes& answer, const Bytes& message) {
+  const std::size_t n = repeated(message[0]);
+  return answer[0] == (message[0] | 0x40) && answer.size() > n && message.size() > n &&
+         std::equal(message.begin() + 1, message.begin() + 1 + static_cast<std::ptrdiff_t>(n), answer.begin() + 1);
+}
+
 /// What ends an update: the reason in words.
 struct Refused {
   std::string reason;
@@ -45,7 +70,8 @@ class Update {
   UpdateResult run() {
     const auto begin = Clock::now();
     try {
-      const auto before = read_state(link_);
+      auto before = read_state(link_);
+      for (int tries = 1; !before && tries < most_tries; ++tries) before = read_state(link_);  // it may be starting
       if (!before) throw Refused{"no battery answers, or it has no boot loader"};
       state_ = *before;
       result_.from = version_text(state_.version);
@@ -117,11 +143,24 @@ class Update {
     return big(expect(ask), 4, 4);
   }
 
+  /// A battery that protects cannot erase: it restarts, its loader erases, and the request is repeated.
+  void erase() {
+    for (int tries = 0; tries < 2; ++tries) {
+      if (expect({0x31, 0x01, 0xFF, 0x00}, 10'000).at(4) == 0) return;
+      const auto end = Clock::now() + std::chrono::seconds(20);
+      auto back = read_state(link_);
+      while (!back && Clock::now() < end) back = read_state(link_);
+      if (!back) throw Refused{"the battery does not answer after its restart"};
+      open_session();
+    }
+    throw Refused{"the battery could not erase the slot"};
+  }
+
   void send() {
     const auto size = static_cast<std::uint32_t>(chosen_->bytes.size());
     std::uint32_t at = resumed();
     result_.resumed_at = at;
-    if (at == 0) expect({0x31, 0x01, 0xFF, 0x00}, 10'000);
+    if (at == 0) erase();
     Bytes download{0x34, 0x00, 0x44};
     put(download, boot::application_slots[chosen_->header.slot] + at, 4);
     put(download, size, 4);
@@ -146,7 +185,10 @@ class Update {
     const auto end = Clock::now() + std::chrono::duration<double>(wish_.start_wait_s);
     while (Clock::now() < end) {
       const auto now = read_state(link_);
-      if (!now || now->trial) continue;
+      if (!now || now->trial) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
+        continue;
+      }
       if (now->running == chosen_->header.slot && now->version == chosen_->header.version) {
         result_.outcome = UpdateResult::Outcome::done;
         return;
@@ -201,7 +243,7 @@ std::optional<Bytes> Link::request(const Bytes& message, int wait_ms) {
       until = Clock::now() + std::chrono::seconds(10);
       continue;
     }
-    const bool ours = negative_answer ? bytes[1] == message[0] : bytes[0] == (message[0] | 0x40);
+    const bool ours = negative_answer ? bytes[1] == message[0] : answers(bytes, message);
     if (ours) return bytes;
   }
   return std::nullopt;
@@ -222,6 +264,8 @@ std::optional<BatteryState> read_state(Link& link) {
   s.security_counter = big(*state, 14, 4);
   s.loader = big(*state, 18, 4);
   s.received = big(*state, 22, 4);
+  s.development_image = ((*state)[26] & 1) != 0;
+  s.accepts_development = ((*state)[26] & 2) != 0;
   return s;
 }
 

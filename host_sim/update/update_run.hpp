@@ -39,6 +39,7 @@ struct BatteryState {
   std::string board;
   std::optional<std::uint8_t> running;  ///< slot; nothing: the loader waits
   bool trial = false, returned = false;
+  bool development_image = false, accepts_development = false;
   std::uint32_t version = 0, cell_hash = 0, security_counter = 0, loader = 0, received = 0;
 };
 

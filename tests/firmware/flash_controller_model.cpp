@@ -71,7 +71,34 @@ void FlashControllerModel::control(std::uint32_t value) {
     erase(value >> 3 & 15);
 }
 
+bool FlashControllerModel::fails_now(std::uint32_t address, std::uint32_t size) {
+  if (operations_to_power_loss < 0 || operations_to_power_loss-- > 0) return false;
+  power_failed = true;
+  torn = {address, size};
+  return true;
+}
+
+void FlashControllerModel::program_elsewhere(std::uint32_t address, unsigned size, std::uint32_t value,
+                                             std::uint32_t before) {
+  if ((cr_ & lock) != 0 || (cr_ & pg) == 0) violations.push_back("flash is written without PG");
+  if (size != 4 || (cr_ >> 8 & 3) != 2) violations.push_back("flash is written with a width other than PSIZE");
+  const bool one_time = address >= 0x1FFF'0000;
+  if (before != 0xFFFF'FFFF && value != before && value != 0 && !(one_time && (value & ~before) == 0))
+    violations.push_back("flash is programmed without being erased");
+  ++slot_words;
+  stall_us_ += word_us;
+  fails_now(address, size);
+}
+
 void FlashControllerModel::erase(std::uint32_t number) {
+  if (number >= 5 && number <= 8 && erase_slot_sector) {
+    constexpr std::uint32_t slot_sector_bytes = 128 * 1024;
+    const std::uint32_t begin = 0x0802'0000 + (number - 5) * slot_sector_bytes;
+    ++slot_sectors;
+    stall_us_ += slot_erase_us;
+    if (!fails_now(begin, slot_sector_bytes)) erase_slot_sector(begin, slot_sector_bytes);
+    return;
+  }
   if (number < 1 || number > sectors) {
     violations.push_back("sector " + std::to_string(number) + " holds code and is erased");
     sr_ |= wrperr;

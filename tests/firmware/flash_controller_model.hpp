@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,21 @@ class FlashControllerModel {
   /// offset from `memory`; size: bytes at once.
   std::uint32_t read_memory(std::uint32_t offset, unsigned size) const;
   void write_memory(std::uint32_t offset, unsigned size, std::uint32_t value);
+  /// Sectors 5 to 8, the slots of a boot loader, and the one-time memory are executed or read directly; here only the
+  /// rules apply: what the core is about to store at an address, and what is there. The caller stores.
+  void program_elsewhere(std::uint32_t address, unsigned size, std::uint32_t value, std::uint32_t before);
+  /// Fills an address range with erased bytes; without it a sector outside the three holds code.
+  std::function<void(std::uint32_t begin, std::uint32_t size)> erase_slot_sector;
+  /// The power fails within the operation after so many; -1: never. Then `power_failed` is set, and the place of the
+  /// operation is in `torn`.
+  int operations_to_power_loss = -1;
+  bool power_failed = false;
+  struct Torn {
+    std::uint32_t address = 0, size = 0;
+  } torn;
+  unsigned slot_words = 0, slot_sectors = 0;  ///< programmed, erased
+  double slot_erase_us = 1'000'000;           ///< 128 KiB, usual time; at most 2 s
+
   /// Resets the registers. The stored data stay.
   void reset();
   /// Returns how long the core has been stopped since the last call.
@@ -40,6 +56,7 @@ class FlashControllerModel {
   void unlock(std::uint32_t key);
   void control(std::uint32_t value);
   void erase(std::uint32_t number);
+  bool fails_now(std::uint32_t address, std::uint32_t size);
 
   std::uint32_t acr_ = 0, sr_ = 0, cr_ = 1U << 31;
   Keys keys_ = Keys::none;

@@ -19,7 +19,7 @@ constexpr std::uint32_t nmi = 2, systick_exception = 15, pvd = 16 + 1, can_tx = 
                         timer_5 = 16 + TimerModel::interrupt_number;
 constexpr std::uint32_t apb1enr = 0x40023840, pwr_cr = 0x40007000;
 constexpr double longest_run_us = 20;  ///< peripherals are asked for interrupts so often
-constexpr std::uint32_t one_time_memory = 0x1FFF7800;
+constexpr std::uint32_t one_time_memory = 0x1FFF7800, slots_begin = 0x08020000, slots_end = 0x080A0000;
 
 constexpr std::uint32_t longest_slice = 200;  ///< instructions between an event and its interrupt
 
@@ -35,27 +35,7 @@ std::vector<std::uint8_t> bytes_of(const Words& words) {
 UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t seed, bool crystal)
     : symbols_(symbols_of(image)), random_(seed) {
   rcc.crystal = crystal;
-  constexpr std::uint32_t stored = FlashControllerModel::memory,
-                          stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes,
-                          code = stored + stored_bytes;
-  using enum UnicornCore::Access;
-  core_.map(0x08000000, stored - 0x08000000, read_and_execute);
-  core_.map(code, 0x08100000 - code, read_and_execute);
-  core_.map(0x20000000, 0x20000, read_and_write);
-  core_.map(ccm, ccm_size, read_and_write);
-  core_.map(0x1FFF7000, 0x1000, read);
-  core_.map_registers(stored, stored_bytes);
-  core_.map_registers(0x40000000, 0x30000);
-  core_.map_registers(0x50060000, 0x1000);  // random number generator
-  core_.map_registers(scs, 0x1000);
-  core_.on_read = [this](std::uint32_t address, unsigned size) { return core_read(address, size); };
-  core_.on_write = [this](std::uint32_t address, std::uint32_t value, unsigned size) {
-    core_write(address, value, size);
-  };
-  core_.write(one_time_memory, std::vector<std::uint8_t>(0x210, 0xFF));  // and its lock bytes
-  constexpr std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
-  core_.write(0x1FFF7A2A, std::array<std::uint8_t, 2>{reference & 0xFF, reference >> 8});
-  core_.write(ccm, std::vector<std::uint8_t>(ccm_size, untouched & 0xFF));
+  map_memories(false);
   load(image);
   core_.find_instructions(symbols_);
   core_.on_entry = [this] {
@@ -64,6 +44,44 @@ UnicornBoard::UnicornBoard(const std::filesystem::path& image, std::uint32_t see
   };
   core_.watch_entry(address_of("bms::firmware::estimator_step("));
   start();
+}
+
+void UnicornBoard::map_memories(bool with_slots) {
+  constexpr std::uint32_t stored = FlashControllerModel::memory,
+                          stored_bytes = FlashControllerModel::sectors * FlashControllerModel::sector_bytes,
+                          code = stored + stored_bytes;
+  using enum UnicornCore::Access;
+  core_.map(0x08000000, stored - 0x08000000, read_and_execute);
+  if (with_slots) {
+    core_.map(code, slots_begin - code, read_and_execute);
+    core_.map(slots_begin, slots_end - slots_begin, program_and_execute);
+    core_.map(slots_end, 0x08100000 - slots_end, read_and_execute);
+  } else {
+    core_.map(code, 0x08100000 - code, read_and_execute);
+  }
+  core_.map(0x20000000, 0x20000, read_and_write);
+  core_.map(ccm, ccm_size, read_and_write);
+  core_.map(0x1FFF7000, 0x1000, with_slots ? program_and_execute : read);
+  core_.map_registers(stored, stored_bytes);
+  core_.map_registers(0x40000000, 0x30000);
+  core_.map_registers(0x50060000, 0x1000);  // random number generator
+  core_.map_registers(scs, 0x1000);
+  core_.on_read = [this](std::uint32_t address, unsigned size) { return core_read(address, size); };
+  core_.on_write = [this](std::uint32_t address, std::uint32_t value, unsigned size) {
+    core_write(address, value, size);
+  };
+  core_.on_program = [this](std::uint32_t address, std::uint32_t value, unsigned size) {
+    flash.program_elsewhere(address, size, value, core_.word(address));
+    if (core_.in_blocks()) core_.set_limit(core_.executed());
+    if (flash.power_failed) core_.stop();
+  };
+  flash.erase_slot_sector = [this](std::uint32_t begin, std::uint32_t size) {
+    core_.write(begin, std::vector<std::uint8_t>(size, 0xFF));
+  };
+  core_.write(one_time_memory, std::vector<std::uint8_t>(0x210, 0xFF));  // and its lock bytes
+  constexpr std::uint16_t reference = 1'502;  // VREFINT_CAL: 1.21 V of 3.3 V (datasheet, internal reference voltage)
+  core_.write(0x1FFF7A2A, std::array<std::uint8_t, 2>{reference & 0xFF, reference >> 8});
+  core_.write(ccm, std::vector<std::uint8_t>(ccm_size, untouched & 0xFF));
 }
 
 void UnicornBoard::start() {
@@ -89,6 +107,7 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   flash.reset();
   timer.reset();
   for (const auto& [base, peripheral] : plugged) peripheral->chip_reset();
+  core_.forget_code(slots_begin, slots_end);
   set_reg(UC_ARM_REG_CONTROL, 0);
   set_reg(UC_ARM_REG_PRIMASK, 0);
   set_reg(UC_ARM_REG_XPSR, 1U << 24);
@@ -381,8 +400,9 @@ void UnicornBoard::enter(std::uint32_t exception) {
   const std::uint32_t return_to = handling() ? 0xFFFFFFF1 : 0xFFFFFFF9;  // table B1-8
   set_reg(UC_ARM_REG_LR, fpu ? return_to & ~16U : return_to);
   set_reg(UC_ARM_REG_CONTROL, control & ~4U);
-  set_reg(UC_ARM_REG_XPSR, 1U << 24);  // outside an IT block
-  set_reg(UC_ARM_REG_PC, core_.word(0x08000000 + 4 * exception) | 1);
+  set_reg(UC_ARM_REG_XPSR, 1U << 24);                         // outside an IT block
+  const std::uint32_t vectors = register_value(scs + 0xD08);  // VTOR; the boot pins map flash to 0
+  set_reg(UC_ARM_REG_PC, core_.word((vectors == 0 ? 0x08000000 : vectors) + 4 * exception) | 1);
   active_.push_back(exception);
   ++interrupts_taken;
 }
@@ -495,6 +515,7 @@ void UnicornBoard::slice() {
          static_cast<std::uint64_t>(waits_us * (ticks_per_second / 1e6)));
   }
   refuse_violations();
+  if (flash.power_failed) return lose_power();
   deliver_interrupt();
   const bool watchdog_expired = watchdog.expired(now_us());
   if (watchdog_expired) ended_ = "the watchdog has reset the core";

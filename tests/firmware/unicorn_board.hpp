@@ -39,6 +39,10 @@ namespace bms::firmware {
 class UnicornBoard {
  public:
   explicit UnicornBoard(const std::filesystem::path& image, std::uint32_t seed = 1, bool crystal = true);
+  /// A boot loader and the images of its slots; nothing for an erased slot. Its keys stand in the file of the loader.
+  /// Only what the core executes is known by name: symbols are those of the loader.
+  UnicornBoard(const std::filesystem::path& loader, const std::vector<std::filesystem::path>& images,
+               std::uint32_t seed);
   ~UnicornBoard() = default;
   UnicornBoard(const UnicornBoard&) = delete;
   UnicornBoard& operator=(const UnicornBoard&) = delete;
@@ -89,6 +93,9 @@ class UnicornBoard {
       undefined{0xDE00, 0xDE00};  ///< wfi, b to it; bx lr; udf #0
   std::uint32_t address_of(const std::string& function) const;
   void flip_bit(std::uint32_t address, unsigned bit);
+  /// Writes bytes into the memory of a slot, and reads them, as a debug probe does.
+  void write_flash(std::uint32_t address, std::span<const std::uint8_t> bytes);
+  std::vector<std::uint8_t> read_flash(std::uint32_t address, std::size_t bytes) const;
   /// Programs the one-time programmable memory from its beginning: bits become 0 and stay so (RM0090, 3.6.5).
   void write_one_time_memory(std::span<const std::uint8_t> bytes);
   /// Makes a bit of the RAM stuck.
@@ -135,7 +142,9 @@ class UnicornBoard {
   static constexpr std::uint64_t ticks_per_second =
       336'000'000;  // a multiple of 168 MHz, 16 MHz and of bit rates of 125 to 500 kbit/s
 
+  void map_memories(bool with_slots);
   void load(const std::filesystem::path& image);
+  void lose_power();
   void slice();
   std::uint64_t run_by_instructions();
   std::uint64_t run_by_blocks();

@@ -71,9 +71,25 @@ void UnicornCore::map(std::uint32_t address, std::uint32_t bytes, Access access)
   std::uint32_t protection = UC_PROT_READ;
   if (access == Access::read_and_execute) protection |= UC_PROT_EXEC;
   if (access == Access::read_and_write) protection |= UC_PROT_WRITE;
+  if (access == Access::program_and_execute) protection |= UC_PROT_WRITE | UC_PROT_EXEC;
   memories_.push_back(std::make_unique<Memory>(address, bytes));
   for (uc_struct* engine : engines_)
     must(uc_mem_map_ptr(engine, address, bytes, protection, memories_.back()->content.get()), "memory");
+  if (access != Access::program_and_execute) return;
+  const auto stores = +[](uc_engine*, uc_mem_type, std::uint64_t at, int size, std::int64_t value, void* self) {
+    static_cast<UnicornCore*>(self)->on_program(static_cast<std::uint32_t>(at), static_cast<std::uint32_t>(value),
+                                                static_cast<unsigned>(size));
+  };
+  for (uc_struct* engine : engines_) {
+    uc_hook hook = 0;
+    must(uc_hook_add(engine, &hook, UC_HOOK_MEM_WRITE, reinterpret_cast<void*>(stores), this, address,
+                     std::uint64_t{address} + bytes - 1),
+         "hook");
+  }
+}
+
+void UnicornCore::forget_code(std::uint32_t begin, std::uint32_t end) {
+  for (uc_struct* engine : engines_) uc_ctl_remove_cache(engine, begin, std::uint64_t{end});
 }
 
 void UnicornCore::map_registers(std::uint32_t address, std::uint32_t bytes) {

@@ -36,9 +36,13 @@ class UnicornCore {
   UnicornCore(const UnicornCore&) = delete;
   UnicornCore& operator=(const UnicornCore&) = delete;
 
-  enum class Access { read, read_and_execute, read_and_write };
+  enum class Access { read, read_and_execute, read_and_write, program_and_execute };
   /// Adds a memory of zeros. Address and size are multiples of 4096.
   void map(std::uint32_t address, std::uint32_t bytes, Access access);
+  /// Before each store of the core to a memory with program_and_execute.
+  std::function<void(std::uint32_t address, std::uint32_t value, unsigned bytes)> on_program;
+  /// Call before code runs that the core has stored itself.
+  void forget_code(std::uint32_t begin, std::uint32_t end);
   /// The core's accesses to this range call `on_read` and `on_write`.
   void map_registers(std::uint32_t address, std::uint32_t bytes);
   std::function<std::uint32_t(std::uint32_t address, unsigned bytes)> on_read;

@@ -85,6 +85,7 @@ class InterruptedUpdate {
     if (start.slot != target) return;
     enter("confirm");
     ASSERT_TRUE(confirm(bench_.slots(), target, version));
+    confirmed_version_ = version;
   }
 
   void start(int& cuts, std::map<std::string, int>& by_phase) {
@@ -104,7 +105,7 @@ class InterruptedUpdate {
     phase_ = "confirm after a cut";
     if (random_() % 3 == 0) bench_.flash().cut_in(random_() % 2);
     try {
-      confirm(bench_.slots(), start.slot, start.header.security_version);
+      if (confirm(bench_.slots(), start.slot, start.header.security_version)) confirmed_version_ = running_version_;
     } catch (const PowerCut&) {
       ++cuts;
       ++by_phase[std::string(phase_)];
@@ -112,7 +113,8 @@ class InterruptedUpdate {
     bench_.flash().no_cut();
   }
 
-  /// What runs is byte for byte what was sent to this slot, and never older than what was confirmed.
+  /// What runs is byte for byte what was sent to this slot, and never older than what was confirmed. The test knows
+  /// what was confirmed: a call of confirm() that came back.
   void check_start(const Start& start) {
     ASSERT_TRUE(start.found) << "no image runs after a cut in: " << phase_;
     const std::string& sent = in_slot_[start.slot];
@@ -122,13 +124,14 @@ class InterruptedUpdate {
     ASSERT_TRUE(std::ranges::equal(bytes, bytes_of(sent)));
     running_slot_ = start.slot;
     running_version_ = start.header.version;
+    ASSERT_GE(running_version_, confirmed_version_) << "older than the confirmed one, after a cut in: " << phase_;
   }
 
   std::mt19937 random_;
   Bench bench_;
   std::string in_slot_[2];
   std::uint8_t running_slot_ = 0;
-  std::uint32_t running_version_ = 1;
+  std::uint32_t running_version_ = 1, confirmed_version_ = 1;
   std::string_view phase_, planned_;
 };
 

@@ -149,6 +149,32 @@ TEST_F(UpdateServerTest, ATransferInDriveIsRefusedAndNothingChanges) {
   EXPECT_EQ(battery_.bench().flash().bytes(1), before);
 }
 
+TEST_F(UpdateServerTest, ADriveDuringATransferPausesItAndItIsResumedAtRest) {
+  auto w = wish();
+  w.progress = [&](std::uint32_t done, std::uint32_t) { battery_.rest = done < 5'000; };
+  const auto paused = run(w);
+  EXPECT_EQ(paused.outcome, Outcome::refused);
+  EXPECT_EQ(paused.reason, words_for(Refusal::not_at_rest));
+  battery_.rest = true;
+  w.progress = [](std::uint32_t, std::uint32_t) {};
+  const auto resumed = run(w);
+  EXPECT_EQ(resumed.outcome, Outcome::done) << resumed.reason;
+  EXPECT_GE(resumed.resumed_at, 5'000U);
+}
+
+TEST_F(UpdateServerTest, NoImageIsMadeTheNextOneToStartInDrive) {
+  auto w = wish();
+  w.progress = [&](std::uint32_t done, std::uint32_t of) { battery_.rest = done < of; };
+  const auto paused = run(w);
+  EXPECT_EQ(paused.outcome, Outcome::refused);
+  EXPECT_EQ(paused.reason, words_for(Refusal::not_at_rest));
+  EXPECT_FALSE(read_marks(battery_.bench().slots(), 1).complete);
+  battery_.rest = true;
+  const auto resumed = run(w);  // all bytes are there already
+  EXPECT_EQ(resumed.outcome, Outcome::done) << resumed.reason;
+  EXPECT_EQ(resumed.sent, 0U);
+}
+
 TEST_F(UpdateServerTest, EachRefusalArrivesInWords) {
   EXPECT_EQ(run(wish({.slot = 1, .security_version = 5, .seed = 8, .key = "somebody"})).reason,
             words_for(Refusal::unknown_key));
