@@ -17,6 +17,13 @@
 
 namespace bms::estimator {
 
+/// What the last half hour showed of a model that is used at another temperature than it was identified at.
+template <class S>
+struct SeenError {
+  arithmetic::Variance<S> scatter_v2{};      ///< of the voltage about its mean deviation
+  arithmetic::Variance<S> overpotential2{};  ///< square of the relative error of the overpotential
+};
+
 /// What a sample changed.
 enum class BankEvent : std::uint8_t { none, estimated };
 
@@ -58,8 +65,8 @@ class AmbiguousSoc {
   /// reading from the model without the estimated voltage error, which belongs to the filter's SOC; interval: of soc.
   template <class Cell, class Constants>
   constexpr BankEvent update(const Cell& cell, const model::StepInput<S>& input, const Constants& constants,
-                             const Soc& soc, const Voltage& deviation_v, const Variance& drop_v2, std::uint8_t interval,
-                             State& state) {
+                             const Soc& soc, const Voltage& deviation_v, const Variance& drop_v2,
+                             const SeenError<S>& seen, std::uint8_t interval, State& state) {
     if (bank_.has_run_off(soc)) {  // by an offset of the current: it begins again, or stops to watch
       if (in_background_) {
         bank_.close();
@@ -83,9 +90,11 @@ class AmbiguousSoc {
       return !Model::is_polarisation(laws, k) && !(Model::errors_are_states && k == Model::voltage_error);
     });
     const Variance new_v2 =
-        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated) + relaxing_v2);
+        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated) +
+                 Variance(relaxing_v2 + seen.scatter_v2));
     const Variance persistent_v2 =
-        Variance(Variance(cell.noise.model_v2 + lasting_v2) + Variance(drop_v2 + deviation_v2_));
+        Variance(Variance(Variance(cell.noise.model_v2 + lasting_v2) + Variance(drop_v2 + deviation_v2_)) +
+                 Variance(seen.scatter_v2 + earlier_load_v2(cell, laws, middle, middle_v, constants, seen)));
     const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
       const auto at = look_up(operating_point, there, interval);
       const auto polarised = Model::polarisation_at(state.model_state, middle_v, final_v(at));
@@ -126,6 +135,23 @@ class AmbiguousSoc {
   }
 
  private:
+  /// Variance of what a load before the half hour that was seen left, by the error that the temperature adds to the
+  /// overpotential. at_1c_v: what 1C would leave.
+  template <class Cell, class Laws, class FinalVoltages, class Constants>
+  static constexpr Variance earlier_load_v2(const Cell& cell, const Laws& laws, const model::TablePoint<S>& at,
+                                            const FinalVoltages& at_1c_v, const Constants& constants,
+                                            const SeenError<S>& seen) {
+    if (!(constants.extrapolated_in_bank() > Fraction(0))) return Variance{};
+    Variance sum = Variance(Variance(Voltage(at.r0_ohm * cell.noise.one_c_a)) + Variance(at_1c_v[0]));
+    for (std::size_t k = 1; k < at_1c_v.size(); ++k) {
+      if (Model::is_polarisation(laws, Model::first_voltage + k - 1)) sum = Variance(sum + Variance(at_1c_v[k]));
+    }
+    const Variance left = Variance(
+                       sum * arithmetic::ratio<Variance>(Variance(cell.noise.unknown_a), Variance(cell.noise.one_c_a))),
+                   stated2 = Variance(constants.extrapolation_error() * constants.extrapolation_error());
+    return Variance(Variance(left * left) * (seen.overpotential2 < stated2 ? stated2 : seen.overpotential2));
+  }
+
   constexpr void close_if_decided(const Soc& soc, const Soc& filter_soc) {
     if (bank_.rules_out_beyond(Soc(watches_beyond), arithmetic::Current<S>(closes_above), soc, filter_soc))
       bank_.close();

@@ -77,7 +77,27 @@ class Consistency {
     loads_v2_ = Variance(Variance(loads_v2_ - arithmetic::product<Variance>(loads_v2_, share)) +
                          arithmetic::product<Variance>(Variance(overpotential_v * overpotential_v), share));
   }
+  /// The same deviation, while its scatter is asked for.
+  constexpr void add_scatter(const Voltage& deviation_v, const Fraction& share) {
+    const Fraction left = Fraction(Fraction(1) - share);
+    filled_ = Fraction(share + filled_ * left);
+    scatter_mean_v_ = Voltage(scatter_mean_v_ + share * Voltage(deviation_v - scatter_mean_v_));
+    square_v2_ = Variance(arithmetic::product<Variance>(square_v2_, left) +
+                          arithmetic::product<Variance>(Variance(deviation_v * deviation_v), share));
+  }
   constexpr Variance variance() const { return mean_v_ * mean_v_; }
+  /// Variance of the deviation about its mean, over the last half hour or since it was first asked for.
+  constexpr Variance scatter_v2() const {
+    if (!(filled_ > Fraction(0))) return Variance{};
+    const Variance v2 =
+        Variance(arithmetic::product<Variance>(square_v2_, filled_) - scatter_mean_v_ * scatter_mean_v_);
+    return v2 > Variance(0) ? arithmetic::ratio<Variance>(v2, Variance(filled_ * filled_)) : Variance{};
+  }
+  /// Square of the relative error of the overpotential that would explain this scatter. model_v2: variance of the
+  /// model's error without a load.
+  constexpr Variance seen_error2(const Variance& model_v2) const {
+    return arithmetic::ratio<Variance>(scatter_v2(), Variance(Variance(loads_v2_ - overpotential_v2()) + model_v2));
+  }
   /// Square of the mean overpotential.
   constexpr Variance overpotential_v2() const { return overpotential_v_ * overpotential_v_; }
   /// Mean square of the overpotential.
@@ -121,6 +141,9 @@ class Consistency {
   std::uint64_t last_us_ = 0;  ///< time of the last check that was asked for
   Voltage mean_v_{}, overpotential_v_{};
   Variance loads_v2_{};
+  Fraction filled_{};  ///< weight of all samples so far in the two means that follow
+  Voltage scatter_mean_v_{};
+  Variance square_v2_{};
   Voltage deviation_v_{};        ///< of the last check
   Fraction far_for_{not_far()};  ///< time for which every check was far, in mean_over_s
   bool is_unjudged_ = false;     ///< the last check did not get to is_inconsistent()

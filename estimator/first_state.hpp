@@ -33,21 +33,25 @@ class FirstState {
   using Current = arithmetic::Current<S>;
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
+  using Coupling = arithmetic::Coupling<S>;
   using Variances = typename Model::Variances;
 
  public:
   constexpr FirstState(CellState<S, ModelOf>& state, AmbiguousSoc<S, ModelOf>& ambiguous, std::uint8_t& interval)
       : state_(state), ambiguous_(ambiguous), interval_(interval) {}
 
+  /// error: by how much larger than the cell file says an overpotential may be because of the temperature, relative.
   /// from, voltage_uv: nullptr if it is missing; not both. Opens the bank if the SOC is ambiguous, and in the
   /// background if it was given. Returns the tables at the first SOC.
   template <class Cell>
-  constexpr At set(const Cell& cell, const StepInput& input, bool current_measured,
+  constexpr At set(const Cell& cell, const StepInput& input, bool current_measured, const Coupling& error,
                    const measurement::StartingPoint* from, const std::int32_t* voltage_uv) {
     SocDistribution<S> soc{Soc(0.5), Variance{}};
+    const auto factor = Coupling(error + Coupling(1));
     if (from != nullptr) soc = given(*from);
     const auto tables = operating_point(cell, input);
-    const Reading<Cell> reading = reading_of(cell, input, current_measured, look_up(tables, soc.soc, interval_));
+    const Reading<Cell> reading =
+        reading_of(cell, input, current_measured, Variance(factor * factor), look_up(tables, soc.soc, interval_));
     // a start that is finer than the points of the grid needs no help from a voltage
     if (from == nullptr || soc_of_ppb(from->soc_sigma_ppb) > Soc(2.0 / start_points)) {
       const bool present = voltage_uv != nullptr;
@@ -78,12 +82,13 @@ class FirstState {
   struct StartState {
     typename Model::State state;
     FinalVoltages before_v;
+    Variance larger2;  ///< square of how much larger than these they may be; >= 1
 
     /// own_v2: variances of the states without any current.
     template <class Laws>
     constexpr Variances variances(const Laws& laws, Variances own_v2) const {
-      const auto add = [](Variance& to, const Voltage& half_v, const Voltage& before) {
-        to = Variance(Variance(to + half_v * half_v) + before * before);
+      const auto add = [&](Variance& to, const Voltage& half_v, const Voltage& before) {
+        to = Variance(to + Variance(Variance(half_v * half_v) + before * before) * larger2);
       };
       add(own_v2[0], state[0], before_v[0]);
       for (std::size_t k = Model::first_voltage; k < Model::soc; ++k) {
@@ -122,6 +127,7 @@ class FirstState {
     bool warm;
     Variance rest_v2;
     Current unknown_a;  ///< through R0
+    Variance larger2;
 
     constexpr FinalVoltages final_at(const At& there) const {
       const StepInput unknown{cell.noise.unknown_a, input.duration_s, input.temperature_c};
@@ -129,7 +135,7 @@ class FirstState {
     }
     constexpr StartState start_state(const At& there) const {
       const FinalVoltages there_v = final_at(there);
-      return {Model::polarisation_at(state, final_v, there_v), there_v};
+      return {Model::polarisation_at(state, final_v, there_v), there_v, larger2};
     }
     constexpr Load load(const At& there) const {
       const StartState left = start_state(there);
@@ -143,7 +149,7 @@ class FirstState {
         return Variance(Variance(rest_v2 + unknown_v * unknown_v) + of_polarisation);
       };
       return {there, left.state[0] + Model::sum_v(laws_of(cell), left.state), variance(left),
-              variance(warm ? left : StartState{left.state, charged_v})};
+              variance(warm ? left : StartState{left.state, charged_v, Variance(1)})};
     }
   };
 
@@ -151,7 +157,8 @@ class FirstState {
   /// voltage than at the reference temperature: a cell at rest that reads far above its plateau is full. at: the tables
   /// at any SOC.
   template <class Cell>
-  constexpr Reading<Cell> reading_of(const Cell& cell, const StepInput& input, bool current_measured, const At& at) {
+  constexpr Reading<Cell> reading_of(const Cell& cell, const StepInput& input, bool current_measured,
+                                     const Variance& larger2, const At& at) {
     Variances own_v2{};
     own_v2[0] = cell.noise.v_rc_v2;
     Model::start(laws_of(cell), state_.model_state, own_v2, at, input, cell.noise);
@@ -169,7 +176,8 @@ class FirstState {
                           own_v2,
                           warm,
                           cell.noise.rest_v2,
-                          current_measured ? Current(0) : cell.noise.unknown_a};
+                          current_measured ? Current(0) : cell.noise.unknown_a,
+                          larger2};
     reading.final_v = reading.final_at(at);
     if (!warm) reading.charged_v = charged_before(cell, input);
     return reading;

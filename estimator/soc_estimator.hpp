@@ -352,11 +352,12 @@ class SocEstimator {
     started_ = true;
     monitor_.start(cell);
     const auto& laws = laws_of(cell);
+    set_temperature(cell, sample.temperature_cdegc);
     const StepInput input{laws.true_current(arithmetic::from_micro<Current>(current.ua)), TimeStep(1),
                           temperature(laws, sample.temperature_cdegc)};
-    const At at =
-        FirstState<S, ModelOf>(state_, monitor_.bank(), interval_)
-            .set(cell, input, current.measured, has_start_ ? &from_ : nullptr, voltage ? &sample.voltage_uv : nullptr);
+    const At at = FirstState<S, ModelOf>(state_, monitor_.bank(), interval_)
+                      .set(cell, input, current.measured, constants_.extrapolation_error(),
+                           has_start_ ? &from_ : nullptr, voltage ? &sample.voltage_uv : nullptr);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.model_state, at, input);
     report_state(cell, estimate);
     errors_.start(estimate.soc);

@@ -88,8 +88,9 @@ class SocMonitor {
     const Voltage present_v = Errors::without_error(state, above_ocv_v);
     const Variance mean_v2 = consistency_.overpotential_v2(), present_v2 = present_v * present_v,
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
-    const Variance of_known_v2 =
-        arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2());
+    Variance of_known_v2 = arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2());
+    if (bank_.open()) [[unlikely]]
+      of_known_v2 = Variance(of_known_v2 + Variance(Variance(present_v2 + mean_v2) * seen_.overpotential2));
     return Variance(
         Variance(judged_by_bank() ? of_known_v2 : Variance(of_known_v2 + seen_v2(constants))) +
         arithmetic::product<Variance>(Variance(present_v2 + by_temperature_v2), constants.temperature_error2()));
@@ -97,9 +98,10 @@ class SocMonitor {
 
   /// Returns 0 if the filter may use the voltage; else the flags of a voltage that it may not use. interval: of soc.
   template <class Cell, class Constants>
-  constexpr std::uint32_t judge(const Cell& cell, const StepInput& input, const Constants& constants, const Soc& soc,
-                                const Voltage& innovation_v, const Variance& of_resistances_v2, std::uint8_t interval,
-                                State& state) {
+  [[gnu::noinline]] constexpr std::uint32_t judge(const Cell& cell, const StepInput& input, const Constants& constants,
+                                                  const Soc& soc, const Voltage& innovation_v,
+                                                  const Variance& of_resistances_v2, std::uint8_t interval,
+                                                  State& state) {
     if (bank_.open() &&
         correct_from_bank(cell, input, constants, soc, innovation_v, of_resistances_v2, interval, state))
       return contradicted_ ? soc_ambiguous | soc_contradicted : std::uint32_t{soc_ambiguous};
@@ -120,6 +122,16 @@ class SocMonitor {
   template <class Constants>
   constexpr Variance seen_v2(const Constants& constants) const {
     return arithmetic::product<Variance>(consistency_.variance(), constants.extrapolated());
+  }
+
+  template <class Cell, class Constants>
+  constexpr void look_at_scatter(const Cell& cell, const Constants& constants, const Voltage& deviation_v) {
+    seen_ = {};
+    if (!(constants.extrapolated_in_bank() > Fraction(0))) return;
+    consistency_.add_scatter(deviation_v, share_);
+    seen_ = {
+        arithmetic::product<Variance>(consistency_.scatter_v2(), constants.extrapolated_in_bank()),
+        arithmetic::product<Variance>(consistency_.seen_error2(cell.noise.model_v2), constants.extrapolated_in_bank())};
   }
 
   /// By how much a SOC is outside of what a cell can have; else <= 0.
@@ -179,8 +191,9 @@ class SocMonitor {
                                    std::uint8_t interval, State& state) {
     const bool watched = bank_.in_background();
     const Voltage deviation_v = Errors::with_error(state, innovation_v);
+    look_at_scatter(cell, constants, deviation_v);
     for (int k = constants.bank_points(); k > 0 && bank_.open(); --k)
-      bank_.update(cell, input, constants, soc, deviation_v, of_resistances_v2, interval, state);
+      bank_.update(cell, input, constants, soc, deviation_v, of_resistances_v2, seen_, interval, state);
     if (watched && !bank_.in_background()) {
       contradicted_ = true;
       consistency_.reset();
@@ -192,7 +205,8 @@ class SocMonitor {
   Consistency<S> consistency_;
   Variance reading_noise_v2_{};
   [[no_unique_address]] typename Errors::LastingLoad load_;
-  Fraction share_{};  ///< of the last check in the means
+  SeenError<S> seen_;  ///< while the bank is open
+  Fraction share_{};   ///< of the last check in the means
   AmbiguousSoc<S, ModelOf> bank_;
   bool contradicted_ = false;
 };

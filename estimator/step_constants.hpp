@@ -47,8 +47,13 @@ class StepConstants {
   constexpr const Coupling& known_noise() const { return known_noise_; }
   constexpr const Coupling& relaxing_noise() const { return relaxing_noise_; }
   /// What the overpotential is wrong by outside of the temperatures of the identification, over what it is wrong by
-  /// inside of them; 1 at most.
+  /// inside of them; 1 at most. 0 of a cell file that does not follow the temperature.
   constexpr const Fraction& extrapolated() const { return extrapolated_; }
+  /// The same for a bank, which has no other way to see it. Of a cell file that does not follow the temperature: what
+  /// an overpotential may be wrong by over itself; 1 at most.
+  constexpr const Fraction& extrapolated_in_bank() const { return extrapolated_in_bank_; }
+  /// What the temperature adds to the relative error of the overpotential outside of those of the identification.
+  constexpr const Coupling& extrapolation_error() const { return extrapolation_error_; }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
   /// Points of the bank that a sample updates: as many as pass in its time at rows of one to two seconds.
   constexpr int bank_points() const { return bank_points_; }
@@ -82,21 +87,29 @@ class StepConstants {
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     known_error_ = Coupling(cell.noise.resistance_error);
-    Coupling unknown(0);
-    extrapolated_ = Fraction(0);
+    extrapolation_error_ = Coupling(0);
+    extrapolated_in_bank_ = extrapolated_ = Fraction(0);
+    Coupling over(1);
     if (measurement::temperature_possible(cdegc)) {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
-      if (laws_of(cell).resistances_follow_temperature()) {
-        const Coupling more = extrapolation_error(cell.noise.identified, cdegc, c);
-        if (more > Coupling(0))
-          extrapolated_ =
-              more < known_error_ ? arithmetic::ratio<Fraction>(Variance(more), Variance(known_error_)) : Fraction(1);
-        known_error_ = Coupling(known_error_ + more);
-      } else if (cdegc != cell.reference.cdegc)
-        unknown = arithmetic::magnitude(Coupling(
+      const bool follows = laws_of(cell).resistances_follow_temperature();
+      if (follows)
+        extrapolation_error_ = extrapolation_error(cell.noise.identified, cdegc, c);
+      else if (cdegc != cell.reference.cdegc)
+        extrapolation_error_ = arithmetic::magnitude(Coupling(
             model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c, c) - Factor(1)));
-    }
-    resistance_error_ = Coupling(known_error_ + unknown);
+      if (follows) {
+        over = known_error_;
+        known_error_ = Coupling(known_error_ + extrapolation_error_);
+      }
+      if (extrapolation_error_ > Coupling(0))
+        extrapolated_in_bank_ = extrapolation_error_ < over
+                                    ? arithmetic::ratio<Fraction>(Variance(extrapolation_error_), Variance(over))
+                                    : Fraction(1);
+      if (follows) extrapolated_ = extrapolated_in_bank_;
+      resistance_error_ = follows ? known_error_ : Coupling(known_error_ + extrapolation_error_);
+    } else
+      resistance_error_ = known_error_;
     update_resistance_noise();
   }
 
@@ -159,9 +172,10 @@ class StepConstants {
   Variance soc_noise_{};
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
-  Fraction bank_share_{}, extrapolated_{};
+  Fraction bank_share_{}, extrapolated_{}, extrapolated_in_bank_{};
   std::uint8_t bank_points_ = 1;
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
+  Coupling extrapolation_error_{};
   Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };
 

@@ -29,7 +29,7 @@ struct Restart {
     std::uint8_t interval = 0;
     const double innovation_v =
         model::look_up(cell, true_soc, interval).ocv_v - model::look_up(cell, soc, interval).ocv_v;
-    ambiguous.update(cell, {0, 1, 25}, constants, soc, innovation_v, 0, interval, state);
+    ambiguous.update(cell, {0, 1, 25}, constants, soc, innovation_v, 0, {}, interval, state);
   }
 
   model::Cell<double, model::max_intervals> cell = tests::prepared<double>();

@@ -100,6 +100,41 @@ std::vector<std::pair<int, std::uint64_t>> checks(Consistency<double>& monitor, 
   return which;
 }
 
+/// A monitor that has seen a load switch every minute for some minutes; the overpotential's relative error is given,
+/// and the mean deviation.
+Consistency<double> after_minutes(int minutes, double relative_error, double mean_v) {
+  Consistency<double> monitor;
+  for (int k = 0; k < minutes; ++k) {
+    const double overpotential_v = k % 2 == 0 ? -0.04 : 0;
+    const double deviation_v = mean_v + relative_error * overpotential_v;
+    monitor.add(deviation_v, overpotential_v, 60 * share);
+    monitor.add_scatter(deviation_v, 60 * share);
+  }
+  return monitor;
+}
+
+TEST(Consistency, TheScatterIsThatOfTheTimeSinceTheStartAndNotTheMean) {
+  for (const int minutes : {10, 30, 200}) {
+    for (const double mean_v : {0.0, -0.1})
+      EXPECT_NEAR(std::sqrt(after_minutes(minutes, 0.5, mean_v).scatter_v2()), 0.5 * 0.02, 0.001) << minutes;
+  }
+  EXPECT_EQ(Consistency<double>{}.scatter_v2(), 0);
+}
+
+TEST(Consistency, TheScatterUnderALoadShowsTheErrorOfTheOverpotential) {
+  EXPECT_NEAR(std::sqrt(after_minutes(200, 0.5, -0.1).seen_error2(1e-8)), 0.5, 0.01);
+  EXPECT_NEAR(std::sqrt(after_minutes(200, -2, 0).seen_error2(1e-8)), 2, 0.05);
+  EXPECT_LT(after_minutes(200, 0, -0.1).seen_error2(1e-8), 1e-12);
+  EXPECT_GT(std::sqrt(after_minutes(10, 0.5, -0.1).seen_error2(1e-8)), 0.5) << "half an hour of the load is not known";
+}
+
+TEST(Consistency, AScatterWithoutALoadIsNotThatOfAnOverpotential) {
+  Consistency<double> rest;
+  for (int k = 0; k < 100; ++k) rest.add_scatter(k % 2 == 0 ? 0.001 : -0.001, 60 * share);
+  EXPECT_LT(rest.seen_error2(0.005 * 0.005), 0.05);
+  EXPECT_EQ(Consistency<double>{}.seen_error2(0.005 * 0.005), 0);
+}
+
 TEST(Consistency, TheFirstSampleAndThenOneInAMinuteIsChecked) {
   Consistency<double> monitor;
   const std::vector<std::pair<int, std::uint64_t>> expected = {
