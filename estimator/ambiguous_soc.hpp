@@ -81,7 +81,6 @@ class AmbiguousSoc {
     const auto final_v = [&](const auto& at) { return Model::final_voltages(laws, state.model_state, at, reference); };
     const auto middle_v = final_v(middle);
     const Voltage expected_v = Model::voltage(laws, state.model_state, middle, input);
-    const Fraction uncorrelated(uncorrelated_share);
     const auto h = Model::measurement_jacobian(laws, middle, input);
     const auto states_v2 = state.covariance.variances();
     const Variance relaxing_v2 =
@@ -90,11 +89,11 @@ class AmbiguousSoc {
       return !Model::is_polarisation(laws, k) && !(Model::errors_are_states && k == Model::voltage_error);
     });
     const Variance new_v2 =
-        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated) +
+        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated()) +
                  Variance(relaxing_v2 + seen.scatter_v2));
     const Variance persistent_v2 =
         Variance(Variance(Variance(cell.noise.model_v2 + lasting_v2) + Variance(drop_v2 + deviation_v2_)) +
-                 Variance(seen.scatter_v2 + earlier_load_v2(cell, laws, middle, middle_v, constants, seen)));
+                 unidentified_v2(cell, laws, middle, middle_v, constants, seen));
     const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
       const auto at = look_up(operating_point, there, interval);
       const auto polarised = Model::polarisation_at(state.model_state, middle_v, final_v(at));
@@ -103,7 +102,7 @@ class AmbiguousSoc {
       return {.off_v = off_v,
               .half_v = Voltage(ocv_slope<S>(at) * half_step()),
               .new_v2 = new_v2,
-              .axis_v2 = arithmetic::product<Variance>(axis_v2, uncorrelated),
+              .axis_v2 = arithmetic::product<Variance>(axis_v2, uncorrelated()),
               .persistent_v2 = Variance(persistent_v2 + axis_v2)};
     };
     const auto result = bank_.step(soc, constants.bank_share(), cell.noise.voltage_v2,
@@ -135,10 +134,10 @@ class AmbiguousSoc {
   }
 
  private:
-  /// Variance of what a load before the half hour that was seen left, by the error that the temperature adds to the
-  /// overpotential. at_1c_v: what 1C would leave.
+  /// Variance of a model that is used at another temperature than it was identified at: its scatter, and what the error
+  /// of the overpotential makes of a load before the half hour that was seen. at_1c_v: what 1C would leave.
   template <class Cell, class Laws, class FinalVoltages, class Constants>
-  static constexpr Variance earlier_load_v2(const Cell& cell, const Laws& laws, const model::TablePoint<S>& at,
+  static constexpr Variance unidentified_v2(const Cell& cell, const Laws& laws, const model::TablePoint<S>& at,
                                             const FinalVoltages& at_1c_v, const Constants& constants,
                                             const SeenError<S>& seen) {
     if (!(constants.extrapolated_in_bank() > Fraction(0))) return Variance{};
@@ -149,13 +148,15 @@ class AmbiguousSoc {
     const Variance left = Variance(
                        sum * arithmetic::ratio<Variance>(Variance(cell.noise.unknown_a), Variance(cell.noise.one_c_a))),
                    stated2 = Variance(constants.extrapolation_error() * constants.extrapolation_error());
-    return Variance(Variance(left * left) * (seen.overpotential2 < stated2 ? stated2 : seen.overpotential2));
+    return Variance(seen.scatter_v2 +
+                    Variance(Variance(left * left) * (seen.overpotential2 < stated2 ? stated2 : seen.overpotential2)));
   }
 
   constexpr void close_if_decided(const Soc& soc, const Soc& filter_soc) {
     if (bank_.rules_out_beyond(Soc(watches_beyond), arithmetic::Current<S>(closes_above), soc, filter_soc))
       bank_.close();
   }
+  static constexpr Fraction uncorrelated() { return Fraction(uncorrelated_share); }
   static constexpr Fraction half_step() { return Fraction(0.5 / SocBank<S>::points); }
 
   SocBank<S> bank_;
