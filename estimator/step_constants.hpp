@@ -51,9 +51,15 @@ class StepConstants {
   constexpr const Fraction& extrapolated() const { return extrapolated_; }
   /// The same for a bank, which has no other way to see it. Of a cell file that does not follow the temperature: what
   /// an overpotential may be wrong by over itself; 1 at most.
-  constexpr const Fraction& extrapolated_in_bank() const { return extrapolated_in_bank_; }
+  constexpr Fraction extrapolated_in_bank() const {
+    if (extrapolated_ > Fraction(0)) return extrapolated_;
+    const Coupling error = extrapolation_error();
+    return error < Coupling(1) ? arithmetic::ratio<Fraction>(Variance(error), Variance(1)) : Fraction(1);
+  }
   /// What the temperature adds to the relative error of the overpotential outside of those of the identification.
-  constexpr const Coupling& extrapolation_error() const { return extrapolation_error_; }
+  constexpr Coupling extrapolation_error() const {
+    return extrapolated_ > Fraction(0) ? beyond_range_ : Coupling(resistance_error_ - known_error_);
+  }
   constexpr const Fraction& bank_share() const { return bank_share_; }  ///< for SocBank::step
   /// Points of the bank that a sample updates: as many as pass in its time at rows of one to two seconds.
   constexpr int bank_points() const { return bank_points_; }
@@ -87,29 +93,22 @@ class StepConstants {
   template <class Cell>
   constexpr void set_temperature(const Cell& cell, std::int16_t cdegc) {
     known_error_ = Coupling(cell.noise.resistance_error);
-    extrapolation_error_ = Coupling(0);
-    extrapolated_in_bank_ = extrapolated_ = Fraction(0);
-    Coupling over(1);
+    Coupling unknown(0);
+    extrapolated_ = Fraction(0);
     if (measurement::temperature_possible(cdegc)) {
       const auto c = arithmetic::from_centi<Temperature>(cdegc);
-      const bool follows = laws_of(cell).resistances_follow_temperature();
-      if (follows)
-        extrapolation_error_ = extrapolation_error(cell.noise.identified, cdegc, c);
-      else if (cdegc != cell.reference.cdegc)
-        extrapolation_error_ = arithmetic::magnitude(Coupling(
+      if (laws_of(cell).resistances_follow_temperature()) {
+        const Coupling more = extrapolation_error(cell.noise.identified, cdegc, c);
+        if (more > Coupling(0))
+          extrapolated_ =
+              more < known_error_ ? arithmetic::ratio<Fraction>(Variance(more), Variance(known_error_)) : Fraction(1);
+        known_error_ = Coupling(known_error_ + more);
+        beyond_range_ = more;
+      } else if (cdegc != cell.reference.cdegc)
+        unknown = arithmetic::magnitude(Coupling(
             model::mechanism_detail::arrhenius<S>(cell.reference.energy_over_rt, cell.reference.c, c) - Factor(1)));
-      if (follows) {
-        over = known_error_;
-        known_error_ = Coupling(known_error_ + extrapolation_error_);
-      }
-      if (extrapolation_error_ > Coupling(0))
-        extrapolated_in_bank_ = extrapolation_error_ < over
-                                    ? arithmetic::ratio<Fraction>(Variance(extrapolation_error_), Variance(over))
-                                    : Fraction(1);
-      if (follows) extrapolated_ = extrapolated_in_bank_;
-      resistance_error_ = follows ? known_error_ : Coupling(known_error_ + extrapolation_error_);
-    } else
-      resistance_error_ = known_error_;
+    }
+    resistance_error_ = Coupling(known_error_ + unknown);
     update_resistance_noise();
   }
 
@@ -172,10 +171,10 @@ class StepConstants {
   Variance soc_noise_{};
   Count correlated_samples_{1};
   Coupling resistance_error_{}, resistance_noise_{};
-  Fraction bank_share_{}, extrapolated_{}, extrapolated_in_bank_{};
+  Fraction bank_share_{}, extrapolated_{};
   std::uint8_t bank_points_ = 1;
   [[no_unique_address]] typename Model::OptionalErrorDecay error_decay_{};
-  Coupling extrapolation_error_{};
+  Coupling beyond_range_{};  ///< what a temperature outside of the identification adds to known_error_
   Coupling known_error_{}, known_error2_{}, temperature_error2_{}, known_noise_{}, relaxing_noise_{};
 };
 
