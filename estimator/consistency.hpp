@@ -85,6 +85,11 @@ class Consistency {
     square_v2_ = Variance(arithmetic::product<Variance>(square_v2_, left) +
                           arithmetic::product<Variance>(Variance(deviation_v * deviation_v), share));
   }
+  constexpr void restart_scatter() {
+    filled_ = Fraction(0);
+    scatter_mean_v_ = Voltage(0);
+    square_v2_ = Variance{};
+  }
   constexpr Variance variance() const { return mean_v_ * mean_v_; }
   /// Variance of the deviation about its mean, over the last half hour or since it was first asked for.
   constexpr Variance scatter_v2() const {

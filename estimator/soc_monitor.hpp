@@ -182,6 +182,8 @@ class SocMonitor {
                    seen_v2 = consistency_.variance();
     bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
+    consistency_.restart_scatter();
+    seen_ = {};
   }
 
   /// Returns true if the bank has the SOC; false while it only watches.

@@ -55,7 +55,8 @@ Response response_of(const Recording& r, const std::vector<double>& steps_v, dou
     if (!silent && std::abs(di) < small_step * largest_a) quiet.push_back(std::abs(steps_v[k]));
   }
   if (ratios.size() < fewest_steps || quiet.size() < fewest_rows) return {};
-  return {median(ratios), std::max(least_sigma_v, mad_to_sigma * median(quiet))};
+  // most steps of a coarse voltage are 0: then the largest in twenty say how it is read
+  return {median(ratios), std::max({least_sigma_v, mad_to_sigma * median(quiet), quantile(quiet, 0.95) / 1.96})};
 }
 
 }  // namespace
@@ -76,10 +77,14 @@ std::vector<SilentCurrent> silent_currents(const Recording& r) {
     if (z.size() < fewest_rows) continue;
     std::vector<double> sizes_a;
     // the first two rows and the last may have been under load for a part of their time
+    std::size_t up = 0;
     for (std::size_t k = z.begin + 2; k + 1 < z.end; ++k) {
-      if (std::abs(steps_v[k]) > least_v) sizes_a.push_back(std::abs(steps_v[k]) / response.ohm);
+      if (!(std::abs(steps_v[k]) > least_v)) continue;
+      sizes_a.push_back(std::abs(steps_v[k]) / response.ohm);
+      up += steps_v[k] > 0 ? 1 : 0;
     }
-    if (sizes_a.size() < fewest_silent_steps) continue;
+    // a load is switched on and off; a relaxation goes one way
+    if (sizes_a.size() < fewest_silent_steps || 2 * std::min(up, sizes_a.size() - up) < fewest_silent_steps) continue;
     found.push_back({.rows = z,
                      .from_s = r.time_s[z.begin],
                      .to_s = r.time_s[z.end - 1],

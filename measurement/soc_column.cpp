@@ -101,6 +101,7 @@ Resolution resolution_of(const std::vector<Value>& values) {
   for (const Value& v : values) {
     if (std::abs(v.change) > 1e-9) changes.push_back(std::abs(v.change));
   }
+  if (changes.empty()) return {};            // a column that does not move has no step
   constexpr std::size_t fewest_changes = 3;  // fewer may each be a jump: then the values themselves say the step
   if (changes.size() < fewest_changes) return {grid_of(values), grid_of(values)};
   std::sort(changes.begin(), changes.end());

@@ -17,7 +17,7 @@ import tempfile
 
 LISTS = pathlib.Path(__file__).resolve().parent
 EPILOG = """A folder may bring its own lists, semi_real.toml and natural.toml (their format stands at the beginning of
-those in evidence/benchmark/); else these are used, and what is not in the folder is skipped. A set
+those in evidence/proof/); else these are used, and what is not in the folder is skipped. A set
 takes up to 25 diagnoses: of a NASA discharge a tenth of a second of processor time each, of an A123 drive of 20,000
 rows and more about a minute each. So --only NASA takes two minutes, and all of ../shared/data takes hours.
 Example: ./bms benchmark semi-real ../shared/data --only B0025 --json semi_real.json"""

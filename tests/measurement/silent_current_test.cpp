@@ -66,6 +66,21 @@ TEST(SilentCurrent, IsNotARestNorALoadThatIsReadNorADeadBand) {
   }
 }
 
+/// A rest whose voltage comes back from the load before, read in coarse digits.
+TEST(SilentCurrent, IsNotARelaxationNorACoarseVoltage) {
+  for (const double digit_v : {1e-5, 1e-3, 5e-3, 1e-2}) {
+    for (const double row_s : {1.0, 5.0, 20.0}) {
+      Recording r = make({.row_s = row_s, .load = false});
+      std::vector<double>& v = r.voltage_v.edit();
+      for (std::size_t k = 0; k < r.rows(); ++k) {
+        if (r.time_s[k] >= 4'000 && r.time_s[k] < 8'000) v[k] -= 0.15 * std::exp(-(r.time_s[k] - 4'000) / 60);
+        v[k] = std::round(v[k] / digit_v) * digit_v;
+      }
+      EXPECT_TRUE(silent_currents(r).empty()) << digit_v << ", " << row_s;
+    }
+  }
+}
+
 TEST(SilentCurrent, IsNotLookedForWhereTheVoltageMayBeThatOfAReferenceSource) {
   Recording r = make({});
   EXPECT_FALSE(silent_currents(r).empty());

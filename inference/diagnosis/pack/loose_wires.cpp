@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -96,6 +97,16 @@ double known_level(std::vector<double>& known_v, double level_v, double within_v
   return level_v;
 }
 
+/// The smallest change of half the difference: half of the resolution of a coarse reading. 0 if nothing changes.
+double digit_of(const Pair& p) {
+  double digit_v = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 1; k < p.row.size(); ++k) {
+    const double v = std::abs(p.half_difference_v[k] - p.half_difference_v[k - 1]);
+    if (v > 1e-6) digit_v = std::min(digit_v, v);
+  }
+  return std::isfinite(digit_v) ? digit_v : 0;
+}
+
 Levels levels_of(const Pair& p, double quiet_a) {
   Levels levels;
   const std::vector<double> steps_v = changes_of(p, p.half_difference_v, quiet_a),
@@ -104,7 +115,7 @@ Levels levels_of(const Pair& p, double quiet_a) {
   std::vector<double> sizes_v;
   for (const double v : steps_v) sizes_v.push_back(std::abs(v));
   const double sigma_v = measurement::median(sizes_v) / abs_median_of_normal;
-  levels.leap_v = std::max(of_wires.least_v, of_wires.sigmas * sigma_v);
+  levels.leap_v = std::max({of_wires.least_v, of_wires.sigmas * sigma_v, of_wires.digits * digit_of(p)});
   double level_v = 0;
   std::vector<double> known_v = {0};
   Along sum, before, after;

@@ -185,6 +185,7 @@ struct PackThresholds {
   struct Wires {
     double least_v = 0.005;    ///< of a leap: less is within what a slow channel and noise can do
     double sigmas = 8;         ///< the same, of the usual changes from row to row
+    double digits = 6;         ///< the same, of half a digit of a coarse reading
     double single_cell = 0.5;  ///< change of the sum over the leap: it is 1 if one cell's channel alone leaps
     double most_along = 0.15;  ///< by which sum or the next cells change with the leaps; balancing: by a third or more
     double least_sigma_v = 0.0005;    ///< of a size

@@ -16,7 +16,8 @@ constexpr std::size_t rows = 2'000;
 
 /// Cells of other resistances and charges under steps of the current; `wire` changes what the channels of a row read.
 dp::PackRecording pack_of(std::size_t cells, unsigned seed,
-                          const std::function<void(std::size_t row, std::vector<double>& v)>& wire) {
+                          const std::function<void(std::size_t row, std::vector<double>& v)>& wire,
+                          double digit_v = 1e-3) {
   std::mt19937 random(seed);
   std::normal_distribution<double> noise(0, 1);
   dp::PackRecording pack;
@@ -35,7 +36,7 @@ dp::PackRecording pack_of(std::size_t cells, unsigned seed,
     for (std::size_t c = 0; c < cells; ++c)  // cells empty at other rates
       v.push_back(3.3 + apart[c] * (1 + static_cast<double>(k) / rows) + ohm[c] * current_a + 5e-4 * noise(random));
     wire(k, v);
-    for (std::size_t c = 0; c < cells; ++c) pack.cell_v[c].push_back(std::round(v[c] * 1e3) / 1e3);
+    for (std::size_t c = 0; c < cells; ++c) pack.cell_v[c].push_back(std::round(v[c] / digit_v) * digit_v);
   }
   return pack;
 }
@@ -116,6 +117,16 @@ TEST(LooseWires, AreNotSeenInHealthyPacksBalancersAndSingleOddReadings) {
     EXPECT_TRUE(wires_in(single).empty()) << seed;
     EXPECT_TRUE(wires_in(second).empty()) << seed;
     EXPECT_TRUE(wires_in(odd).empty()) << seed;
+  }
+}
+
+TEST(LooseWires, AreNotTheDigitsOfACoarseReading) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    for (const double digit_v : {0.002, 0.005, 0.01, 0.02}) {
+      dp::PackRecording pack = pack_of(
+          4 + seed, seed, [](std::size_t, std::vector<double>&) {}, digit_v);
+      EXPECT_TRUE(wires_in(pack).empty()) << seed << ", " << digit_v;
+    }
   }
 }
 
