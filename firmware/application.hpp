@@ -111,9 +111,9 @@ class Application {
     board_.longest_sample_us = std::max(board_.longest_sample_us, took_us);
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();
-    serve_update<Board>(pack,
-                        inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
-                        !board_.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
+    serve_update<Board>(
+        pack, inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
+        !board_.state.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
   }
 
   /// Stores the state when the battery is switched off. The last call.

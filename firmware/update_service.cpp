@@ -92,6 +92,7 @@ void UpdateService::judge_trial(const Health& health) {
   if (!healthy || health.now_us - healthy_since_us_ < healthy_us) return;
   if (!boot::confirm(slots_, started_.slot, started_.header.security_version)) return;
   trial_ = false;
+  battery_.security_counter = boot::security_counter(slots_);
   server_->confirmed();
 }
 

@@ -1,5 +1,5 @@
 // Insulation monitor between battery and frame. Back ends: stm32f4/insulation_pwm (Bender IR155 and alike),
-// insulation_can (Bender iso175), absent/insulation.
+// firmware/insulation_monitor.hpp (Bender iso175), absent/insulation.
 #pragma once
 
 #include <cstdint>

@@ -263,7 +263,7 @@ void UpdateServer::transfer(std::span<const std::uint8_t> request, Answer& answe
 bool UpdateNode::next_frame(can::Frame& frame, std::uint64_t now_us) {
   if (transport_.next_frame(frame, now_us)) return true;
   if (transport_.sending()) return false;
-  if (server_.restart_due()) {
+  if (server_.take_restart()) {
     surroundings_.restart();
     return false;
   }

@@ -22,6 +22,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "authentication/codes.hpp"
 #include "boot/iso_tp.hpp"
@@ -68,8 +69,9 @@ class UpdateServer {
                                        std::uint64_t now_us);
   /// Returns true if the answer takes so long that "response pending" comes first.
   static bool takes_long(std::span<const std::uint8_t> request);
-  /// Returns true once after an accepted reset; the caller sends the answer and calls restart().
-  bool restart_due() const { return restart_; }
+  /// Returns true once after an accepted reset; the caller has sent the answer and calls restart(). A restart that does
+  /// not follow has to be asked for again.
+  bool take_restart() { return std::exchange(restart_, false); }
   /// The image has confirmed itself: it is on trial no longer.
   void confirmed() { started_.trial = false; }
   Refusal last_refusal() const { return refusal_; }

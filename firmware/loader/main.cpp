@@ -35,7 +35,9 @@ class Waiting final : public bms::boot::UpdateSurroundings {
       : challenges_(device.value_or(bms::authentication::Key{}), 0, 0) {}
   bool at_rest() override { return true; }
   std::uint64_t challenge() override { return challenges_.next(bms::hal::now_us()); }
-  void restart() override { wanted_us_ = bms::hal::now_us(); }
+  void restart() override {
+    if (wanted_us_ == 0) wanted_us_ = bms::hal::now_us();
+  }
   /// The answer leaves the controller before the restart.
   bool restart_due() const { return wanted_us_ != 0 && bms::hal::now_us() - wanted_us_ > 20'000; }
 
