@@ -118,14 +118,14 @@ TEST_F(Bq76952, ThePublishedChargeEqualsTheTrueChargeOverTenMinutesOfDriving) {
   EXPECT_EQ(front_end.charge_restarts(), 0U);
 }
 
-TEST_F(Bq76952, AnOpenOrShortedTemperatureSensorGivesNoTemperature) {
+TEST_F(Bq76952, AnOpenTemperatureSensorGivesNoTemperatureAndAShortedOneIsTold) {
   start();
   model.temperature_c = {-273.15, 25, 3000, 25};
   model.advance(200'000);
   next(300'000);
   EXPECT_EQ(sample.temperature_cdegc[0], measurement::no_temperature);
   EXPECT_NEAR(sample.temperature_cdegc[1], 2500, 5);
-  EXPECT_EQ(sample.temperature_cdegc[2], measurement::no_temperature);
+  EXPECT_EQ(sample.temperature_cdegc[2], measurement::shorted_thermistor);
 }
 
 TEST_F(Bq76952, UpToThreeFaultsInARowAtAnyTransferLeaveCorrectReadingsOrNone) {

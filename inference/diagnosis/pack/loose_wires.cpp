@@ -102,7 +102,7 @@ double digit_of(const Pair& p) {
   double digit_v = std::numeric_limits<double>::infinity();
   for (std::size_t k = 1; k < p.row.size(); ++k) {
     const double v = std::abs(p.half_difference_v[k] - p.half_difference_v[k - 1]);
-    if (v > 1e-6) digit_v = std::min(digit_v, v);
+    if (v > of_wires.least_digit_v) digit_v = std::min(digit_v, v);
   }
   return std::isfinite(digit_v) ? digit_v : 0;
 }

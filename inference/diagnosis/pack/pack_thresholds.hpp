@@ -183,10 +183,11 @@ struct PackThresholds {
 
   /// Of intermittent sense wires.
   struct Wires {
-    double least_v = 0.005;    ///< of a leap: less is within what a slow channel and noise can do
-    double sigmas = 8;         ///< the same, of the usual changes from row to row
-    double digits = 6;         ///< the same, of half a digit of a coarse reading
-    double single_cell = 0.5;  ///< change of the sum over the leap: it is 1 if one cell's channel alone leaps
+    double least_v = 0.005;       ///< of a leap: less is within what a slow channel and noise can do
+    double sigmas = 8;            ///< the same, of the usual changes from row to row
+    double digits = 6;            ///< the same, of half a digit of a coarse reading
+    double least_digit_v = 1e-6;  ///< less is how a double is rounded
+    double single_cell = 0.5;     ///< change of the sum over the leap: it is 1 if one cell's channel alone leaps
     double most_along = 0.15;  ///< by which sum or the next cells change with the leaps; balancing: by a third or more
     double least_sigma_v = 0.0005;    ///< of a size
     double same_level = 0.25;         ///< of the leap: such levels are one
