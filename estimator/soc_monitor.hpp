@@ -89,7 +89,8 @@ class SocMonitor {
     const Variance mean_v2 = consistency_.overpotential_v2(), present_v2 = present_v * present_v,
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
     Variance of_known_v2 = arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2());
-    if (bank_.open()) [[unlikely]]
+    // not while the bank only watches: the gate would let an outlier widen itself
+    if (judged_by_bank()) [[unlikely]]
       of_known_v2 = Variance(of_known_v2 + Variance(Variance(present_v2 + mean_v2) * seen_.overpotential2));
     return Variance(
         Variance(judged_by_bank() ? of_known_v2 : Variance(of_known_v2 + seen_v2(constants))) +

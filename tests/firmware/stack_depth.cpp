@@ -205,10 +205,12 @@ class Deepest {
   std::set<std::uint32_t> active_;
 };
 
-/// Calls by pointer in the images: constructors from reset, and the switch tables of libgcc, which return into their
-/// caller.
+/// Calls by pointer in the images: constructors from reset, who listens for updates (an image without a slot has
+/// nobody), and the switch tables of libgcc, which return into their caller.
 const ByPointer& calls_by_pointer() {
-  static const ByPointer known = {{"reset_handler", {"_GLOBAL__sub_I_"}}, {"__gnu_thumb1_case_", {}}};
+  static const ByPointer known = {{"reset_handler", {"_GLOBAL__sub_I_"}},
+                                  {"bms::hal::dispatch_frame", {"bms::firmware::UpdateService::receive"}},
+                                  {"__gnu_thumb1_case_", {}}};
   return known;
 }
 
