@@ -55,8 +55,9 @@ Response response_of(const Recording& r, const std::vector<double>& steps_v, dou
     if (!silent && std::abs(di) < small_step * largest_a) quiet.push_back(std::abs(steps_v[k]));
   }
   if (ratios.size() < fewest_steps || quiet.size() < fewest_rows) return {};
-  // most steps of a coarse voltage are 0: then the largest in twenty say how it is read
-  return {median(ratios), std::max({least_sigma_v, mad_to_sigma * median(quiet), quantile(quiet, 0.95) / 1.96})};
+  // most steps of a coarse voltage may be 0: then the largest in twenty say how it is read
+  const double usual_v = mad_to_sigma * median(quiet);
+  return {median(ratios), std::max(least_sigma_v, usual_v > 0 ? usual_v : quantile(quiet, 0.95) / 1.96)};
 }
 
 }  // namespace
