@@ -9,6 +9,7 @@
 #include "files/cell_file.hpp"
 #include "images/firmware_image.hpp"
 #include "images/image_file.hpp"
+#include "tests/firmware/contactor_port_models.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 
 namespace bms::firmware {
@@ -18,8 +19,8 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 constexpr std::uint32_t by_watchdog = 1U << 29 | 1U << 26, by_software = 1U << 28 | 1U << 26;
-constexpr std::uint32_t gpioc_moder = 0x40020800, gpioc_bsrr = 0x40020818, all_closed = 15U << 6;
-constexpr double start_ms = 1'800;  // a new chip first erases its data sectors
+constexpr std::uint32_t bsrr = 0x18, moder = 0, all_closed = 15U << 6;  // of port C
+constexpr double start_ms = 1'800;                                      // a new chip first erases its data sectors
 
 class ClockBoard : public ::testing::Test {
  protected:
@@ -38,6 +39,9 @@ class ClockBoard : public ::testing::Test {
   }
   bool clock_failed() { return board.board_state().clock_failed; }
 
+  ClockBoard() { board.plugged = {{ContactorPort::base, &port}}; }
+
+  ContactorPort port;
   UnicornBoard board{image()};
 };
 
@@ -98,7 +102,7 @@ TEST_P(ForEachLsi, ACoreThatHangsIsResetWithin3770Ms) {
   EXPECT_THAT(board.resets, ElementsAre(by_watchdog));
   EXPECT_NEAR(board.now_ms() - stands_ms, timeout_ms(), 110) << "the last feed is up to a sample period ago";
   EXPECT_LE(board.now_ms() - stands_ms, 3'770);
-  EXPECT_EQ(board.register_value(gpioc_moder), 0U) << "the outputs are inputs again: open by their pull-downs";
+  EXPECT_EQ(port.mode(), 0U) << "the outputs are inputs again: open by their pull-downs";
 }
 
 /// The longest erase of the datasheet, 500 ms for 16 KiB, and the shortest timeout.
@@ -124,7 +128,7 @@ TEST_P(ForEachLsi, AFrequencyOutsideTheRangeIsReportedWithin5MsWithoutAReset) {
   board.rcc.free_running_hz = 50e6;  // less than 17/47 of 168 MHz
   board.run_for_ms(5);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
+  EXPECT_EQ(port.output() & all_closed, 0U);
   board.rcc.pll_locks = true;  // for the bus
   board.run_for_ms(1'100);
   EXPECT_EQ(last<can::Board>()->clock_failed, 1U) << "until the next start";
@@ -158,7 +162,7 @@ TEST_F(WithClockCrystal, AnErrorOf2PercentIsFoundAndOneOfHalfAPercentIsNot) {
   board.rcc.crystal_hz = 0.98 * 25e6;
   board.run_for_ms(5);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
+  EXPECT_EQ(port.output() & all_closed, 0U);
 }
 
 TEST_F(WithClockCrystal, WhenItStopsTheInternalOscillatorReplacesIt) {
@@ -183,7 +187,7 @@ TEST_F(ClockBoard, ACrystalThatStopsResetsTheCoreWhichContinuesWithoutIt) {
   EXPECT_EQ(board.rcc.core_hz(), 16e6);
   EXPECT_GT(board.estimates, before);
   EXPECT_TRUE(clock_failed());
-  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
+  EXPECT_EQ(port.output() & all_closed, 0U);
 }
 
 TEST_F(ClockBoard, ACrystalThatStopsForAMomentIsRecordedAsAnNmi) {
@@ -205,10 +209,10 @@ TEST_F(ClockBoard, SupplyAndCrystalInterruptTheHandlerOfTheBus) {
   board.run_for_ms(start_ms);
   board.patch("can1_tx_interrupt", UnicornBoard::hangs);
   ASSERT_TRUE(board.run_until([&] { return board.exception() == 16 + 19; }, 200));
-  board.disturb_register(gpioc_bsrr, 0);
+  port.write(bsrr, all_closed, 0);
   board.supply(true);
   board.run_for_ms(0.05);
-  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
+  EXPECT_EQ(port.output() & all_closed, 0U);
   EXPECT_EQ(board.exception(), 16U + 19) << "it goes on";
   board.rcc.crystal = false;
   EXPECT_TRUE(board.run_until([&] { return !board.resets.empty(); }, 0.2));
@@ -227,11 +231,11 @@ TEST_F(ClockBoard, AWrongBitOfTheImageIsFoundWhileItRuns) {
 
 TEST_F(ClockBoard, DisturbedPinsAreWrittenAgainWithTheNextSample) {
   board.run_for_ms(start_ms);
-  board.disturb_register(gpioc_bsrr, 15U << 6);      // all closed
-  board.disturb_register(gpioc_moder, 0xAAU << 12);  // pins of another peripheral
+  port.write(bsrr, all_closed, 0);
+  port.write(moder, 0xAAU << 12, 0);  // pins of another peripheral
   board.run_for_ms(110);
-  EXPECT_EQ(board.register_value(gpioc_bsrr) & all_closed, 0U) << "the last write may be that of heater and fan";
-  EXPECT_EQ(board.register_value(gpioc_moder) >> 12 & 0xFF, 0x55U);
+  EXPECT_EQ(port.output() & all_closed, 0U);
+  EXPECT_EQ(port.mode() >> 12 & 0xFF, 0x55U);
 }
 
 }  // namespace
