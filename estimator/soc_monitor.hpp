@@ -89,12 +89,13 @@ class SocMonitor {
     const Variance mean_v2 = consistency_.overpotential_v2(), present_v2 = present_v * present_v,
                    by_temperature_v2 = Errors::past_load_v2(mean_v2, consistency_.loads_v2());
     Variance of_known_v2 = arithmetic::product<Variance>(Variance(present_v2 + mean_v2), constants.known_error2());
-    // not while the bank only watches: the gate would let an outlier widen itself
-    if (judged_by_bank()) [[unlikely]]
+    // not seen_ while the bank only watches: the gate would let an outlier widen itself
+    if (judged_by_bank())
       of_known_v2 = Variance(of_known_v2 + Variance(Variance(present_v2 + mean_v2) * seen_.overpotential2));
-    return Variance(
-        Variance(judged_by_bank() ? of_known_v2 : Variance(of_known_v2 + seen_v2(constants))) +
-        arithmetic::product<Variance>(Variance(present_v2 + by_temperature_v2), constants.temperature_error2()));
+    else
+      of_known_v2 = Variance(of_known_v2 + seen_v2(constants));
+    return Variance(of_known_v2 + arithmetic::product<Variance>(Variance(present_v2 + by_temperature_v2),
+                                                                constants.temperature_error2()));
   }
 
   /// Returns 0 if the filter may use the voltage; else the flags of a voltage that it may not use. interval: of soc.
@@ -125,14 +126,15 @@ class SocMonitor {
     return arithmetic::product<Variance>(consistency_.variance(), constants.extrapolated());
   }
 
+  /// Updates what the scatter of the voltage shows where the model was not identified, while the bank is open.
   template <class Cell, class Constants>
   constexpr void look_at_scatter(const Cell& cell, const Constants& constants, const Voltage& deviation_v) {
     seen_ = {};
-    if (!(constants.extrapolated_in_bank() > Fraction(0))) return;
+    const Fraction outside = constants.extrapolated_in_bank();
+    if (!(outside > Fraction(0))) return;
     consistency_.add_scatter(deviation_v, share_);
-    seen_ = {
-        arithmetic::product<Variance>(consistency_.scatter_v2(), constants.extrapolated_in_bank()),
-        arithmetic::product<Variance>(consistency_.seen_error2(cell.noise.model_v2), constants.extrapolated_in_bank())};
+    seen_ = {arithmetic::product<Variance>(consistency_.scatter_v2(), outside),
+             arithmetic::product<Variance>(consistency_.seen_error2(cell.noise.model_v2), outside)};
   }
 
   /// By how much a SOC is outside of what a cell can have; else <= 0.
