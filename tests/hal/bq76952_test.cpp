@@ -118,7 +118,7 @@ TEST_F(Bq76952, ThePublishedChargeEqualsTheTrueChargeOverTenMinutesOfDriving) {
   EXPECT_EQ(front_end.charge_restarts(), 0U);
 }
 
-TEST_F(Bq76952, AnOpenTemperatureSensorGivesNoTemperatureAndAShortedOneIsTold) {
+TEST_F(Bq76952, AnOpenTemperatureSensorGivesNoTemperatureAndAShortedOneItsOwnReading) {
   start();
   model.temperature_c = {-273.15, 25, 3000, 25};
   model.advance(200'000);
