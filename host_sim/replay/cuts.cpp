@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <numbers>
+#include <numeric>
 #include <thread>
 
 #include <fmt/format.h>
@@ -104,9 +106,26 @@ CutRun figures_of(const Errors& e, const std::optional<double>& knee_s) {
   return run;
 }
 
-std::optional<SocPrior> prior_of(const CutStart& start, std::size_t cut, double reference) {
+/// Quantile of the standard normal distribution, 0 < p < 1.
+double normal_quantile(double p) {
+  double from = -9, to = 9;
+  for (int k = 0; k < 60; ++k) {
+    const double middle = 0.5 * (from + to);
+    (0.5 * std::erfc(-middle / std::numbers::sqrt2) < p ? from : to) = middle;
+  }
+  return 0.5 * (from + to);
+}
+
+/// In units of sigma. Neighbouring cuts get quantiles that lie far apart, since the SOC falls from cut to cut.
+double drawn_error(std::size_t cut, std::size_t cuts) {
+  std::size_t stride = static_cast<std::size_t>(0.618 * static_cast<double>(cuts)) | 1;
+  while (std::gcd(stride, cuts) != 1) ++stride;
+  return normal_quantile((static_cast<double>(cut * stride % cuts) + 0.5) / static_cast<double>(cuts));
+}
+
+std::optional<SocPrior> prior_of(const CutStart& start, std::size_t cut, std::size_t cuts, double reference) {
   if (!start.known) return std::nullopt;
-  double off = cut % 2 == 0 ? -start.off : start.off;
+  double off = start.drawn ? start.sigma * drawn_error(cut, cuts) : cut % 2 == 0 ? -start.off : start.off;
   if (reference + off < 0 || reference + off > 1) off = -off;
   return SocPrior{std::clamp(reference + off, 0.0, 1.0), start.sigma};
 }
@@ -205,7 +224,7 @@ CutResult run_cuts(const files::CellFile& cell, const measurement::Recording& re
       const std::vector<measurement::Sample> rest(all.begin() + static_cast<std::ptrdiff_t>(first[k]), all.end());
       const std::optional<double> knee_s = first_knee_s(recording, first[k], knees);
       for (std::size_t s = 0; s < cut_starts.size(); ++s) {
-        const auto prior = prior_of(cut_starts[s], k, recording.soc_ref[first[k]]);
+        const auto prior = prior_of(cut_starts[s], k, cuts, recording.soc_ref[first[k]]);
         errors[s][k] =
             errors_of(recording, first[k], run_on_host(cell, rest, starting_point(prior), scalar, Timing::none).rows);
         CutRun& run = result.starts[s].runs[k];

@@ -21,8 +21,12 @@ struct CutStart {
   bool known;    ///< otherwise it starts from the first voltage alone
   double off;    ///< error of the initial SOC, >= 0. Its sign alternates; where the SOC would leave 0..1 it is turned
   double sigma;  ///< standard deviation that the estimator is given
+  bool drawn = false;  ///< the errors are quantiles of a normal distribution with this sigma, each at one cut
 };
+/// A start that is exactly right is better than the sigma that it is given; only one that is drawn shows whether sigma
+/// is too wide.
 inline constexpr std::array cut_starts{CutStart{"right", "right, sigma 2 %", true, 0, 0.02},
+                                       CutStart{"drawn", "drawn from sigma 2 %", true, 0, 0.02, true},
                                        CutStart{"wrong_20", "20 % wrong, sigma 20 %", true, 0.2, 0.2},
                                        CutStart{"wrong_30", "30 % wrong, sigma 30 %", true, 0.3, 0.3},
                                        CutStart{"confident", "20 % wrong, sigma 2 %", true, 0.2, 0.02},

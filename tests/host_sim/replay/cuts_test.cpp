@@ -45,7 +45,8 @@ TEST(Cuts, OfTheShiftRunFromEachCutToTheEndWithEachStart) {
   }
   EXPECT_LT(result.starts[0].worst_rmse[0], 0.03) << "started right";
   EXPECT_EQ(result.starts[0].inside[2], 1);
-  EXPECT_GT(result.starts[3].runs[1].rmse[0], 0) << "started 20 % wrong";
+  EXPECT_GT(result.starts[1].median_ratio, result.starts[0].median_ratio) << "drawn";
+  EXPECT_GT(result.starts[4].runs[1].rmse[0], 0) << "started 20 % wrong";
 }
 
 TEST(Cuts, AreCountedIfTheyAreOutsideOfTwoSigmaForTooLong) {
