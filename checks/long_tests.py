@@ -21,7 +21,11 @@ def main():
             tests |= {".".join(found) for found in re.findall(r"^TEST(?:_F|_P)?\((\w+), (\w+)\)",
                                                               sources.read(root, path), re.M)}
     for path in sources.paths(root, ("CMakeLists.txt",)):
-        tests |= set(re.findall(r"add_test\(NAME (\w+\.\w+)", sources.read(root, path)))
+        text = sources.read(root, path)
+        tests |= set(re.findall(r"add_test\(NAME (\w+\.\w+)", text))
+        for of, names in re.findall(r"foreach\(\w+ ([^)]*)\)(?:(?!endforeach).)*?add_test\(NAME (\w+\.)\$",
+                                    text, re.S):
+            tests |= {names + one for one in of.split()}
     faults, seen = [], set()
     for number, line in enumerate(sources.read(root, LIST).splitlines(), 1):
         if line.startswith("#"):

@@ -21,7 +21,7 @@ std::pair<std::size_t, std::size_t> find_table(const std::string& text, const st
   return {begin + opening.size(), end};
 }
 
-std::string trimmed(const std::string& cell) {
+std::string without_spaces(const std::string& cell) {
   const std::size_t begin = cell.find_first_not_of(' '), end = cell.find_last_not_of(' ');
   return begin == std::string::npos ? "" : cell.substr(begin, end - begin + 1);
 }
@@ -39,7 +39,7 @@ CommittedFigures::CommittedFigures(const std::filesystem::path& readme, const st
       continue;
     char* rest = nullptr;
     const double value = std::strtod(figure.c_str(), &rest);
-    if (rest != figure.c_str()) figures_[trimmed(what)] = value;
+    if (rest != figure.c_str()) figures_[without_spaces(what)] = value;
   }
 }
 

@@ -25,12 +25,12 @@ struct Round {
 };
 constexpr std::array rounds = {Round{6, 12}, Round{15, 3}, Round{100, 1}};
 
-struct Candidate {
+struct Beginning {
   HammersteinWiener model;
   double cost = INFINITY;
 };
 
-void improve(Candidate& c, const Data& data, std::size_t every, int iterations) {
+void improve(Beginning& c, const Data& data, std::size_t every, int iterations) {
   const LeastSquares all = simulation_error(data, c.model, every);
   const VectorXd start = to_unknowns(c.model);
   const Index first = unknowns_before_corners(c.model);
@@ -75,7 +75,7 @@ std::vector<DiscreteModel> linear_blocks(const DiscreteModel& linear, const Stru
 HammersteinWiener find_hammerstein_wiener(const DiscreteModel& linear, const Structure& structure,
                                           const model::OcvTable<double>& ocv, const Data& data, double soc) {
   const std::size_t every = std::max<std::size_t>(1, data.size() / enough_samples);
-  std::vector<Candidate> all;
+  std::vector<Beginning> all;
   for (const DiscreteModel& block : linear_blocks(linear, structure, data)) {
     for (const double below : places) {
       for (const double above : places)
@@ -83,8 +83,8 @@ HammersteinWiener find_hammerstein_wiener(const DiscreteModel& linear, const Str
     }
   }
   for (const Round& round : rounds) {
-    for (Candidate& c : all) improve(c, data, every, round.iterations);
-    std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) { return a.cost < b.cost; });
+    for (Beginning& c : all) improve(c, data, every, round.iterations);
+    std::stable_sort(all.begin(), all.end(), [](const Beginning& a, const Beginning& b) { return a.cost < b.cost; });
     all.resize(std::min(all.size(), round.kept));
   }
   return all.front().model;

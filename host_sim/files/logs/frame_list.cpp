@@ -25,29 +25,29 @@ constexpr double largest_of_a_cell_v = 5.5;
 
 /// "BatteryCurrent1" as words: "battery current 1".
 std::string words_of(const std::string& name) {
-  std::string words;
+  std::string text;
   for (std::size_t k = 0; k < name.size(); ++k) {
     const auto is = [&](std::size_t at, int (*kind)(int)) { return kind(static_cast<unsigned char>(name[at])) != 0; };
     const bool next =
         k > 0 && ((is(k, std::isupper) && is(k - 1, std::islower)) || (is(k, std::isdigit) && is(k - 1, std::isalpha)));
-    words += (next ? " " : "") + std::string(1, name[k]);
+    text += (next ? " " : "") + std::string(1, name[k]);
   }
-  return normalised(words);
+  return normalised(text);
 }
 
 /// The number at the end of a name; 0 without one.
-std::size_t number_at_end(const std::string& words) {
-  const std::size_t at = words.find_last_not_of("0123456789") + 1;
-  return at < words.size() && words.size() - at < 4 ? std::stoul(words.substr(at)) : 0;
+std::size_t number_at_end(const std::string& text) {
+  const std::size_t at = text.find_last_not_of("0123456789") + 1;
+  return at < text.size() && text.size() - at < 4 ? std::stoul(text.substr(at)) : 0;
 }
 
 std::string column_of(const ListedSignal& s) {
   if (s.values == s.missing) return {};
-  const std::string words = words_of(s.name);
-  const auto has = [&](const char* word) { return words.find(word) != std::string::npos; };
+  const std::string text = words_of(s.name);
+  const auto has = [&](const char* word) { return text.find(word) != std::string::npos; };
   const bool limit = has("limit") || has("max") || has("min") || has("target") || has("request");
   if (limit) return {};
-  const std::size_t number = number_at_end(words);
+  const std::size_t number = number_at_end(text);
   const std::string unit = normalised(s.unit);
   if (unit.empty()) return {};
   if (scale_of(Quantity::current, unit)) return "current_a";

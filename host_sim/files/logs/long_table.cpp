@@ -275,7 +275,7 @@ class LongTable {
   double day_s_ = 0, last_clock_s_ = 0;
 };
 
-constexpr std::size_t sniffed_lines = 200;  ///< a device says much before its first reading
+constexpr std::size_t lines_to_a_reading = 200;  ///< a device says much before its first reading
 
 TableLayout console_layout() {
   TableLayout layout;
@@ -289,7 +289,7 @@ TableLayout console_layout() {
 bool is_console(const std::string& path) {
   TextLines lines(path);
   std::string_view line;
-  for (std::size_t k = 0; k < sniffed_lines && lines.next(line); ++k) {
+  for (std::size_t k = 0; k < lines_to_a_reading && lines.next(line); ++k) {
     if (console_reading(line)) return true;
   }
   return false;

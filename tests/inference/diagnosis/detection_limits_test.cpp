@@ -19,7 +19,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 
 constexpr std::size_t offset = model::mechanism_index_of<model::VoltageOffset>,
-                      leakage = model::mechanism_index_of<model::Leakage>;
+                      leak = model::mechanism_index_of<model::Leakage>;
 
 ResidualTest leaves(double gain) {
   ResidualTest left;
@@ -39,15 +39,15 @@ TEST(DetectionLimits, AskForWhatTheDecisionAsksFor) {
 }
 
 TEST(DetectionLimits, WhatWasTestedAndHasNoLimitIsNotVisible) {
-  const std::vector<DetectionLimit> limits = limits_of({{offset, 0.001}, {leakage, 10}}, leaves(0), 6, {});
+  const std::vector<DetectionLimit> limits = limits_of({{offset, 0.001}, {leak, 10}}, leaves(0), 6, {});
   ASSERT_EQ(limits.size(), 1U) << "no cell leaks 60 A";
   Diagnosis d;
   d.verdict = Verdict::no_mismatch;
   d.limits = limits;
   for (std::size_t m = 0; m < model::mechanism_count; ++m) {
-    if (m != offset && m != leakage) d.not_testable.push_back({m, "too short"});
+    if (m != offset && m != leak) d.not_testable.push_back({m, "too short"});
   }
-  EXPECT_THAT(not_visible(d), ElementsAre(leakage));
+  EXPECT_THAT(not_visible(d), ElementsAre(leak));
   d.verdict = Verdict::data_fault;
   EXPECT_THAT(not_visible(d), IsEmpty());
 }

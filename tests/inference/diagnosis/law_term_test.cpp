@@ -168,7 +168,7 @@ TEST(LawTerm, AReadingThatMovesInEveryRowWithASquareWaveDoesNotLeap) {
   EXPECT_FALSE(follows_in_leaps(r));
 }
 
-TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned({})); }
+TEST(LawTerm, AHealthyCellHasNone) { EXPECT_FALSE(learned(AddV{})); }
 
 }  // namespace
 }  // namespace bms::diagnosis
