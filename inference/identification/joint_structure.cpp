@@ -270,7 +270,7 @@ ModelErrors errors_of(const std::vector<LeftOutError>& all) {
     const double more = std::pow(e.resistance_error, 2) + of_rest - std::pow(errors.resistance_fraction, 2);
     per_ev.push_back(std::sqrt(std::max(0.0, more)) / e.beyond_per_ev);
   }
-  errors.resistance_per_ev = measurement::rms(per_ev);
+  errors.resistance_per_ev = growth_outside(per_ev);
   return errors;
 }
 
@@ -295,6 +295,10 @@ IdentifiedExtent extent_of(const JointModel& model, std::span<const JointRecordi
 }
 
 }  // namespace
+
+double growth_outside(std::span<const double> per_ev) {
+  return per_ev.empty() ? 0 : std::hypot(model::default_resistance_per_ev, measurement::rms(per_ev));
+}
 
 std::vector<std::vector<std::size_t>> by_temperature(std::span<const JointRecording> recordings) {
   constexpr double near_k = 5;  // as far apart as recordings of one temperature can be

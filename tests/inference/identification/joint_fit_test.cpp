@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -258,6 +259,27 @@ TEST(JointStructure, LeavesOutWhatTheRecordingsAllow) {
     EXPECT_EQ(choice.parts.size(), c.parts) << c.all_c.size();
     EXPECT_EQ(choice.left_outs.size(), c.left_out);
   }
+}
+
+// Of many cells whose errors grow differently, two edges seen, the error beyond a third: the plain RMS of the two would
+// hold 80 % of them inside two sigma.
+TEST(JointStructure, TheGrowthFromTwoEdgesHoldsTheErrorBeyondThem) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> scale(0.02, 0.3);
+  constexpr int cells = 20'000;
+  int inside = 0, by_rms = 0;
+  for (int k = 0; k < cells; ++k) {
+    const double of_cell = scale(random);
+    const std::array edges{of_cell * normal(random), of_cell * normal(random)};
+    const double next = std::abs(of_cell * normal(random));
+    inside += next <= 2 * growth_outside(edges) ? 1 : 0;
+    by_rms += next <= 2 * std::hypot(edges[0], edges[1]) / std::sqrt(2) ? 1 : 0;
+  }
+  EXPECT_GT(inside, 0.93 * cells);
+  EXPECT_LT(inside, 0.99 * cells);
+  EXPECT_LT(by_rms, 0.85 * cells);
+  EXPECT_EQ(growth_outside({}), 0);
 }
 
 TEST(JointStructure, SeparatesAWrongResistanceFromAWrongSocAxis) {
