@@ -125,7 +125,8 @@ double drawn_error(std::size_t cut, std::size_t cuts) {
 
 std::optional<SocPrior> prior_of(const CutStart& start, std::size_t cut, std::size_t cuts, double reference) {
   if (!start.known) return std::nullopt;
-  double off = start.drawn ? start.sigma * drawn_error(cut, cuts) : cut % 2 == 0 ? -start.off : start.off;
+  const double sign = cut % 2 == 0 ? -1 : 1;
+  double off = start.drawn ? start.sigma * drawn_error(cut, cuts) : sign * start.off;
   if (reference + off < 0 || reference + off > 1) off = -off;
   return SocPrior{std::clamp(reference + off, 0.0, 1.0), start.sigma};
 }

@@ -296,10 +296,6 @@ IdentifiedExtent extent_of(const JointModel& model, std::span<const JointRecordi
 
 }  // namespace
 
-double growth_outside(std::span<const double> per_ev) {
-  return per_ev.empty() ? 0 : std::hypot(model::default_resistance_per_ev, measurement::rms(per_ev));
-}
-
 std::vector<std::vector<std::size_t>> by_temperature(std::span<const JointRecording> recordings) {
   constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
   std::vector<double> means_c;

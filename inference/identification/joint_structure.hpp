@@ -64,12 +64,6 @@ struct ModelErrors {
   double initial_soc = 0, model_v = 0, correlation_s = 0;
 };
 
-/// ModelErrors::resistance_per_ev from those of the recordings beyond the two edges of the range [eV]; 0 without any.
-/// Two edges say little about a scale. Before them the square of the scale is model::default_resistance_per_ev squared
-/// with the weight of two edges (scaled inverse chi square, two degrees of freedom); its mean after them is the sum of
-/// the default's square and theirs.
-double growth_outside(std::span<const double> per_ev);
-
 /// Where the recordings of a fit have been: rows whose voltage counts.
 struct IdentifiedExtent {
   std::optional<double> temperature_min_c, temperature_max_c;

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <cstddef>
 
+#include "measurement/statistics.hpp"
+#include "model/cell_parameters.hpp"
+
 namespace bms::identification {
 
 namespace {
@@ -51,6 +54,10 @@ VarianceParts variance_parts(std::span<const double> rms, std::span<const double
     }
   }
   return {std::sqrt(constant), std::sqrt(per)};
+}
+
+double growth_outside(std::span<const double> per_ev) {
+  return per_ev.empty() ? 0 : std::hypot(model::default_resistance_per_ev, measurement::rms(per_ev));
 }
 
 }  // namespace bms::identification

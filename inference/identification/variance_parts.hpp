@@ -15,4 +15,10 @@ struct VarianceParts {
 /// largest errors do not decide alone. With fewer than two sets, or if by does not differ, all is constant.
 VarianceParts variance_parts(std::span<const double> rms, std::span<const double> by);
 
+/// ModelErrors::resistance_per_ev from those of the recordings beyond the two edges of the range [eV]; 0 without any.
+/// Two edges say little about a scale. Before them the square of the scale is model::default_resistance_per_ev squared
+/// with the weight of two edges (scaled inverse chi square, two degrees of freedom); its mean after them is the sum of
+/// the default's square and theirs.
+double growth_outside(std::span<const double> per_ev);
+
 }  // namespace bms::identification
