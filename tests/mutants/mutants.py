@@ -317,7 +317,7 @@ class Build:
         source = root / file
         if overlay and (overlay / file).exists():
             source = overlay / file
-        before = [f"-I{overlay}"] if overlay else []
+        before = [f"-I{overlay}", f"-I{overlay}/firmware"] if overlay else []
         command = [compiler, *before, *words, *checks]
         if file.endswith("_test.cpp"):
             command += ["-include-pch", f"{self.header}.pch"]
