@@ -37,9 +37,12 @@ bms::hal::CanSettings can_settings() {
 }
 
 template <class Board>
-void start_updates(const bms::storage::Persistence& persistence) {
-  if constexpr (requires { Board::update(); })
+void start_updates(bms::storage::Persistence& persistence) {
+  if constexpr (requires { Board::update(); }) {
     Board::update().start(persistence.events().starts, persistence.charge().operating_s);
+    if (Board::update().returned())
+      persistence.fault(bms::can::StoredFault::code_new_image_not_confirmed, bms::hal::calendar_s());
+  }
 }
 
 using BoardApplication = bms::firmware::Application<BoardCell, bms::firmware::BoardVehicleProfile>;

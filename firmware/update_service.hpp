@@ -37,6 +37,8 @@ class UpdateService final : public boot::UpdateSurroundings {
   bool restart_due(const Health& health);
   /// The image has not confirmed itself yet: no contactor may close.
   bool on_trial() const { return trial_; }
+  /// This start has rejected a newer image on trial.
+  bool returned() const { return started_.returned; }
 
   // UpdateSurroundings
   bool at_rest() override { return at_rest_; }

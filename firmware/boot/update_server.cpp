@@ -160,6 +160,7 @@ void UpdateServer::read(std::span<const std::uint8_t> request, Answer& answer) c
       answer.put(started_.header.version, 4).put(started_.header.cell_hash, 4).put(battery_.security_counter, 4);
       answer.put(battery_.loader_version, 4).put(receiver_.active() ? receiver_.received() : 0, 4);
       answer.put((started_.header.development() ? 1U : 0U) | (battery_.product ? 0U : 2U));
+      answer.put(static_cast<std::uint32_t>(since_us_ / 1'000), 4);
       return;
     case 0xF1A4:
       answer.put(static_cast<std::uint8_t>(refusal_));

@@ -45,8 +45,8 @@ class UpdateSurroundings {
 
 /// What runs, as 22 F1A1 sends it: running slot (0xFF: none), trial (1), last start returned (1), version (4), cell
 /// hash (4), security counter (4), loader version (4), bytes received (4), development (1: the image, 2: the loader
-/// accepts such images).
-inline constexpr std::size_t state_record_bytes = 24;
+/// accepts such images), time since this start in ms (4): less than before after a restart.
+inline constexpr std::size_t state_record_bytes = 28;
 
 class UpdateServer {
  public:

@@ -40,7 +40,8 @@ std::string name_in(std::string_view message, std::string_view signal, std::uint
 
 std::string fault_name(std::uint32_t code) {
   if (code >= processor_fault) return fmt::format("processor exception {}", code - processor_fault);
-  const std::string name = name_in("Faults", "FirstCause", code);
+  std::string name = name_in("StoredFault", "Code", code);
+  if (name.empty()) name = name_in("Faults", "FirstCause", code);
   return name.empty() ? fmt::format("fault {}", code) : name;
 }
 

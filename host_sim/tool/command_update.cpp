@@ -1,15 +1,18 @@
-// bms update: new firmware for a battery, over its CAN bus (host_sim/update/update_run.hpp).
+// bms update: new firmware for a battery, over its CAN bus (host_sim/update/update_run.hpp), or for the trucks of a
+// depot (host_sim/update/depot_update.hpp).
 #include <memory>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "files/text_file.hpp"
 #include "monitor/frame_source.hpp"
 #include "tool/commands.hpp"
 #include "tool/key_file.hpp"
 #include "tool/options.hpp"
 #include "tool/progress.hpp"
+#include "update/depot_update.hpp"
 #include "update/update_run.hpp"
 
 namespace bms::tool {
@@ -19,7 +22,7 @@ namespace {
 using update::UpdateResult;
 
 struct UpdateOptions {
-  std::string source, image, key;
+  std::string source, image, key, out;
   unsigned operator_number = 0;
   double wait_s = 90;
   Output output;
@@ -41,13 +44,19 @@ class UpdateCommand final : public Command {
   CLI::App* add(CLI::App& app) override {
     CLI::App& c = *app.add_subcommand("update", "Send new firmware to a battery over CAN and start it");
     c.footer("Example: bms update can0 update.bms --key pack17.key --operator 42");
-    c.add_option("source", o_.source, "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter")->required();
+    c.add_option(
+         "source", o_.source,
+         "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter; NAME.csv: trucks, buses, keys of a depot")
+        ->required();
     c.add_option("image", o_.image, "signed images, from bms image sign")->required()->check(not_empty());
     c.add_option("--key", o_.key, "device key of this battery, 32 hexadecimal digits")
         ->check(not_empty())
         ->type_name("FILE");
     c.add_option("--operator", o_.operator_number, "who answers for it")->check(Within(0, 65'535));
     c.add_option("--wait", o_.wait_s, "seconds for the new image to confirm itself")->check(Within(1, 3'600));
+    c.add_option("--out", o_.out, "table of what runs where, with a table of trucks; a later run continues it")
+        ->check(not_empty())
+        ->type_name("FILE");
     add_json(c, o_.output);
     return &c;
   }
@@ -58,12 +67,14 @@ class UpdateCommand final : public Command {
     if (!o_.key.empty()) wish.device_key = read_key(o_.key);
     wish.operator_number = static_cast<std::uint16_t>(o_.operator_number);
     wish.start_wait_s = o_.wait_s;
+    if (o_.source.ends_with(".csv")) return depot(wish);
+    if (!o_.out.empty()) throw files::BadInput("--out", 1, "needs a table of trucks, NAME.csv, in place of a bus");
     const auto shown = progress_on_stderr(0.5, [](double done, double left_s, const std::string&) {
       return fmt::format("sending: {:.0f} %, {:.0f} s left", 100 * done, left_s);
     });
     if (shown && !o_.output.quiet)
       wish.progress = [&shown](std::uint32_t done, std::uint32_t of) { shown(static_cast<double>(done) / of, ""); };
-    const UpdateResult result = send(wish);
+    const UpdateResult result = send(o_.source, wish);
     const nlohmann::ordered_json json{{"command", "update"},
                                       {"from", result.from},
                                       {"to", result.to},
@@ -83,10 +94,35 @@ class UpdateCommand final : public Command {
   }
 
  private:
-  UpdateResult send(const update::UpdateWish& wish) const {
+  int depot(const update::UpdateWish& all) const {
+    if (o_.out.empty()) throw files::BadInput("--out", 1, "is missing, expected the table of what runs where");
+    if (!o_.key.empty()) throw files::BadInput("--key", 1, "is of one battery, expected the column key of the trucks");
+    const auto trucks = update::read_trucks(o_.source);
+    const auto one = [&](const update::Truck& truck) {
+      update::UpdateWish wish = all;
+      if (!truck.key.empty()) wish.device_key = read_key(truck.key.string());
+      return send(truck.bus, wish);
+    };
+    const auto shown = [&](const update::TruckRow& row) {
+      print_summary(o_.output, fmt::format("{}: {}: {}{}{}\n", row.bus, row.truck, row.state,
+                                           row.reason.empty() ? "" : ": ", row.reason));
+    };
+    const auto rows = update::update_trucks(trucks, files::sha256(files::read_file(o_.image)), o_.out, one, shown);
+    nlohmann::ordered_json json{{"command", "update"}, {"trucks", nlohmann::ordered_json::array()}};
+    bool all_done = true;
+    for (const auto& row : rows) {
+      json["trucks"].push_back(
+          {{"truck", row.truck}, {"bus", row.bus}, {"state", row.state}, {"runs", row.runs}, {"reason", row.reason}});
+      all_done = all_done && row.state == "done";
+    }
+    if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(2) + "\n");
+    return all_done ? 0 : 1;
+  }
+
+  static UpdateResult send(const std::string& bus, const update::UpdateWish& wish) {
     try {
-      const auto source = monitor::open_source(o_.source);
-      if (!source->live()) throw files::BadInput(o_.source, 1, "is a recording, expected a bus with the battery");
+      const auto source = monitor::open_source(bus);
+      if (!source->live()) throw files::BadInput(bus, 1, "is a recording, expected a bus with the battery");
       return update::run_update(*source, wish);
     } catch (const monitor::SourceError& error) {
       throw files::BadInput(error.source, error.line, error.what());

@@ -18,6 +18,7 @@ using Bytes = Link::Bytes;
 
 constexpr std::size_t piece_bytes = 1'024;
 constexpr int most_tries = 5;
+constexpr std::chrono::seconds longest_until_restart{3};  // a sample, and the state that is stored before
 constexpr std::uint8_t negative = 0x7F, pending = 0x78;
 
 std::uint64_t now_us() {
@@ -179,27 +180,40 @@ class Update {
     expect({0x31, 0x01, 0xFF, 0x01}, 10'000);
   }
 
-  /// Restarts the battery and reads what runs until the trial is over.
+  /// Restarts the battery and reads what runs until the trial is over. A battery may answer before it restarts, and a
+  /// drive that begins then keeps it from restarting: only a time since its start that went back shows the next one.
   void restart() {
+    const auto before = read_state(link_);
     expect({0x11, 0x01});
-    const auto end = Clock::now() + std::chrono::duration<double>(wish_.start_wait_s);
-    while (Clock::now() < end) {
+    const auto begin = Clock::now();
+    const auto end = begin + std::chrono::duration<double>(wish_.start_wait_s);
+    bool restarted = !before;
+    for (std::uint32_t up_ms = before ? before->up_ms : 0; Clock::now() < end;) {
       const auto now = read_state(link_);
-      if (!now || now->trial) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(200));
-        continue;
-      }
-      if (now->running == chosen_->header.slot && now->version == chosen_->header.version) {
-        result_.outcome = UpdateResult::Outcome::done;
-        return;
-      }
-      if (now->returned || now->running == state_.running) {
-        result_.outcome = UpdateResult::Outcome::returned;
-        result_.reason = "the new image did not confirm itself; the old one runs again";
-        return;
-      }
+      restarted = restarted || (now && now->up_ms < up_ms);
+      if (now) up_ms = now->up_ms;
+      if (now && !restarted && Clock::now() - begin > longest_until_restart)
+        throw Refused{"the battery has not restarted: the image is complete and starts at its next restart"};
+      if (now && restarted && !now->trial) return decide(*now);
+      std::this_thread::sleep_for(std::chrono::milliseconds(200));
     }
-    throw Refused{"the new image was started and has not confirmed itself yet"};
+    throw Refused{restarted ? "the new image was started and has not confirmed itself yet"
+                            : "the battery does not answer after its restart"};
+  }
+
+  /// No image is on trial any more.
+  void decide(const BatteryState& now) {
+    if (now.running == chosen_->header.slot && now.version == chosen_->header.version) {
+      result_.outcome = UpdateResult::Outcome::done;
+      return;
+    }
+    result_.outcome = UpdateResult::Outcome::returned;
+    const auto why = link_.request({0x22, 0xF1, 0xA4});
+    const auto refusal = static_cast<boot::Refusal>(why && why->size() == 4 ? (*why)[3] : 0);
+    result_.reason = refusal == boot::Refusal::none || refusal == boot::Refusal::trial_failed
+                         ? "the new image did not confirm itself"
+                         : fmt::format("the new image was not started: {}", boot::words_for(refusal));
+    result_.reason += now.running ? "; the old one runs again" : "; no image runs";
   }
 
   Link link_;
@@ -266,6 +280,7 @@ std::optional<BatteryState> read_state(Link& link) {
   s.received = big(*state, 22, 4);
   s.development_image = ((*state)[26] & 1) != 0;
   s.accepts_development = ((*state)[26] & 2) != 0;
+  s.up_ms = big(*state, 27, 4);
   return s;
 }
 

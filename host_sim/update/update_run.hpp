@@ -41,6 +41,7 @@ struct BatteryState {
   bool trial = false, returned = false;
   bool development_image = false, accepts_development = false;
   std::uint32_t version = 0, cell_hash = 0, security_counter = 0, loader = 0, received = 0;
+  std::uint32_t up_ms = 0;  ///< time since its start
 };
 
 struct UpdateWish {

@@ -71,10 +71,10 @@ void FlashControllerModel::control(std::uint32_t value) {
     erase(value >> 3 & 15);
 }
 
-bool FlashControllerModel::fails_now(std::uint32_t address, std::uint32_t size) {
+bool FlashControllerModel::fails_now(std::uint32_t address, std::uint32_t size, std::uint32_t before) {
   if (operations_to_power_loss < 0 || operations_to_power_loss-- > 0) return false;
   power_failed = true;
-  torn = {address, size};
+  torn = {address, size, before};
   return true;
 }
 
@@ -87,7 +87,8 @@ void FlashControllerModel::program_elsewhere(std::uint32_t address, unsigned siz
     violations.push_back("flash is programmed without being erased");
   ++slot_words;
   stall_us_ += word_us;
-  fails_now(address, size);
+  if (on_operation) on_operation({address, size, value});
+  fails_now(address, size, before);
 }
 
 void FlashControllerModel::erase(std::uint32_t number) {
@@ -95,8 +96,9 @@ void FlashControllerModel::erase(std::uint32_t number) {
     constexpr std::uint32_t slot_sector_bytes = 128 * 1024;
     const std::uint32_t begin = 0x0802'0000 + (number - 5) * slot_sector_bytes;
     ++slot_sectors;
+    if (on_operation) on_operation({begin, slot_sector_bytes, 0});
     stall_us_ += slot_erase_us;
-    if (!fails_now(begin, slot_sector_bytes)) erase_slot_sector(begin, slot_sector_bytes);
+    if (!fails_now(begin, slot_sector_bytes, ~0U)) erase_slot_sector(begin, slot_sector_bytes);
     return;
   }
   if (number < 1 || number > sectors) {
@@ -107,6 +109,7 @@ void FlashControllerModel::erase(std::uint32_t number) {
   const auto begin = bytes.begin() + (number - 1) * sector_bytes;
   std::fill(begin, begin + sector_bytes, std::uint8_t{0xFF});
   ++sectors_erased;
+  if (on_operation) on_operation({memory + (number - 1) * sector_bytes, sector_bytes, 0});
   stall_us_ += erase_us;
 }
 
@@ -132,6 +135,7 @@ void FlashControllerModel::write_memory(std::uint32_t at, unsigned size, std::ui
     violations.push_back("flash is programmed without being erased");
   for (unsigned k = 0; k < size && !worn_out; ++k) bytes[at + k] &= static_cast<std::uint8_t>(value >> (8 * k));
   ++words_programmed;
+  if (on_operation) on_operation({memory + at, size, value});
   stall_us_ += word_us;
 }
 

@@ -34,9 +34,16 @@ class FlashControllerModel {
   bool power_failed = false;
   struct Torn {
     std::uint32_t address = 0, size = 0;
+    std::uint32_t before = ~0U;  ///< of a word: its bits that are 0 already stay so
   } torn;
   unsigned slot_words = 0, slot_sectors = 0;  ///< programmed, erased
-  double slot_erase_us = 1'000'000;           ///< 128 KiB, usual time; at most 2 s
+  /// Every word that is programmed and every sector that is erased, in their order.
+  struct Operation {
+    std::uint32_t address = 0, bytes = 4;  ///< more than a word: erased
+    std::uint32_t value = 0;
+  };
+  std::function<void(const Operation&)> on_operation;
+  double slot_erase_us = 1'000'000;  ///< 128 KiB, usual time; at most 2 s
 
   /// Resets the registers. The stored data stay.
   void reset();
@@ -56,7 +63,7 @@ class FlashControllerModel {
   void unlock(std::uint32_t key);
   void control(std::uint32_t value);
   void erase(std::uint32_t number);
-  bool fails_now(std::uint32_t address, std::uint32_t size);
+  bool fails_now(std::uint32_t address, std::uint32_t size, std::uint32_t before);
 
   std::uint32_t acr_ = 0, sr_ = 0, cr_ = 1U << 31;
   Keys keys_ = Keys::none;

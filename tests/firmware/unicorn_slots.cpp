@@ -35,7 +35,8 @@ std::vector<std::uint8_t> UnicornBoard::read_flash(std::uint32_t address, std::s
 /// Bits that were being changed are undefined afterwards.
 void UnicornBoard::lose_power() {
   std::vector<std::uint8_t> content = read_flash(flash.torn.address, flash.torn.size);
-  for (std::uint8_t& byte : content) byte = static_cast<std::uint8_t>(byte | random_());
+  for (std::size_t k = 0; k < content.size(); ++k)
+    content[k] = static_cast<std::uint8_t>(content[k] | (random_() & flash.torn.before >> 8 * (k % 4)));
   core_.write(flash.torn.address, content);
   flash.power_failed = false;
   start_again(1U << 27 | 1U << 26 | 1U << 25);

@@ -1,8 +1,9 @@
 #!/usr/bin/env python3
-"""Mutation test: puts small faults into firmware/protection/ and firmware/storage/, one at a time, and checks that the
-tests fail.
+"""Mutation test: puts small faults into firmware/protection/ and firmware/storage/, or into firmware/boot/, one at a
+time, and checks that the tests fail.
 
-    mutants.py BUILD_FOLDER [--count 200] [--seed 1] [--jobs 2] [--report FILE] [--again REPORT]
+    mutants.py BUILD_FOLDER [--part protection|boot] [--count 200] [--seed 1] [--jobs 2] [--report FILE]
+      [--again REPORT]
 
   mutant            one change at a place that the seed chooses: a comparison, an operator, a constant (plus or minus
                     one; from 100 on twice or half), a condition that is always true or false, a removed statement
@@ -37,8 +38,15 @@ root = pathlib.Path(tempfile.mkdtemp(prefix="mutants_")) / "source"
 atexit.register(shutil.rmtree, root.parent, ignore_errors=True)
 shutil.copytree(checkout, root, ignore=shutil.ignore_patterns("build*", ".git", "recordings", "corpus"), symlinks=True)
 (root / "evidence/recordings").symlink_to(checkout / "evidence/recordings")
-sources = sorted(path.relative_to(root).as_posix() for folder in ("firmware/protection", "firmware/storage")
-                 for path in (root / folder).iterdir() if path.suffix in (".hpp", ".cpp"))
+(root / "build").mkdir()
+(root / "build/mbedtls").symlink_to(checkout / "build/mbedtls")  # cmake/mbedtls.cmake
+
+
+def sources():
+    folders = ["firmware/boot"] if part == "boot" else ["firmware/protection", "firmware/storage"]
+    return sorted(path.relative_to(root).as_posix() for folder in folders for path in (root / folder).iterdir()
+                  if path.suffix in (".hpp", ".cpp"))
+
 
 # Test programs in the order in which they run: test source, its target, further sources.
 # The test with the name of the mutant's file runs first.
@@ -68,13 +76,24 @@ programs = [
     ("tests/firmware/telemetry_test.cpp", "telemetry_test",
      ["tests/firmware/host_hal.cpp", "hal/absent/flash.cpp", *store]),
 ]
+boot = [f"firmware/boot/{name}.cpp" for name in ("iso_tp", "receiver", "slots", "update_server", "verify")]
+programs_of_boot = [
+    ("tests/firmware/boot/crypto_test.cpp", "boot_test", ["firmware/boot/crypto_mbedtls.cpp"]),
+    *((f"tests/firmware/boot/{name}_test.cpp", "boot_test", ["tests/firmware/storage/flash_model.cpp", *boot])
+      for name in ("iso_tp", "slots", "receiver", "memory_of_the_chip", "update_server", "update_power_cut")),
+]
+part = "boot" if "boot" in sys.argv else "protection"
+if part == "boot":
+    programs = programs_of_boot
 # the test that runs first for files without a test of their name
 first = {
     "table_text": "table_test", "faults": "table_test", "pack_design": "table_test",
     "fault_monitor": "fault_matrix_test", "guarded": "contactor_walk_test", "crc32": "records_test",
-    "log_line": "log_test",
+    "log_line": "log_test", "container": "receiver_test", "verify": "receiver_test", "refusal": "receiver_test",
+    "slot_flash": "slots_test", "crypto_mbedtls": "crypto_test", "handover": "memory_of_the_chip_test",
+    "key_table": "memory_of_the_chip_test", "flash_map": "update_server_test",
 }
-checks = ["-O1", "-g0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DBMS_POWER_CUT_SEQUENCES=60"]
+checks = ["-O1", "-g0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DBMS_POWER_CUT_SEQUENCES=60", "-DBMS_UPDATE_POWER_CUTS=300"]
 compiler = "clang++"  # twice as fast as g++
 compile_limit_s = 300
 
@@ -194,7 +213,7 @@ def mutant_of(file, begin, end, new):
 
 def chosen(seed):
     chance = random.Random(seed)
-    all_places = [(f, *p) for f in sources for p in places(f)]
+    all_places = [(f, *p) for f in sources() for p in places(f)]
     chance.shuffle(all_places)
     for file, begin, end, instead in all_places:
         yield mutant_of(file, begin, end, chance.choice(instead))
@@ -217,6 +236,8 @@ def equivalents():
         lines = [line.strip() for line in block.strip().splitlines() if not line.startswith("#")]
         if len(lines) == 4:
             file, before, after, reason = lines
+            if file not in sources():
+                continue
             if bare(before) not in bare((root / file).read_text()):
                 sys.exit(f"mutants: {path}: {file} has no line: {before}")
             found[file, bare(before), bare(after)] = reason
@@ -296,7 +317,7 @@ class Build:
         source = root / file
         if overlay and (overlay / file).exists():
             source = overlay / file
-        before = [f"-I{overlay}"] if overlay else []
+        before = [f"-I{overlay}", f"-I{overlay}/firmware"] if overlay else []
         command = [compiler, *before, *words, *checks]
         if file.endswith("_test.cpp"):
             command += ["-include-pch", f"{self.header}.pch"]
@@ -343,7 +364,7 @@ class Build:
         with tempfile.TemporaryDirectory(dir=self.scratch, prefix=f"m{number}_") as name:
             overlay = pathlib.Path(name)
             text = (root / file).read_text()
-            (overlay / file).parent.mkdir()
+            (overlay / file).parent.mkdir(parents=True)
             (overlay / file).write_text(text[:mutant["begin"]] + mutant["new"] + text[mutant["end"]:])
             stem = pathlib.Path(file).stem
             own = first.get(stem, f"{stem}_test")
@@ -373,6 +394,7 @@ class Build:
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("build")
+    parser.add_argument("--part", choices=("protection", "boot"), default="protection")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)

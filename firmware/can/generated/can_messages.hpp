@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 8e1470e0b1d1c156f503062a372394cfefa263d72cc21c572349b0d30d2568d8
+// SHA-256 of that file: acf925323040449581cb0979eecb8e3ee062f67a68b7b8f8bae60c8a4ce4b40e
 #pragma once
 
 #include <array>
@@ -2268,7 +2268,8 @@ struct StoredFault {
   static constexpr SignalLayout index_layout = {12, 4, false, 1.0F, 0.0F, 0.0F, 15.0F, false, 0};
   std::uint32_t index = 0;  ///< 0: the newest fault.
   static constexpr SignalLayout code_layout = {16, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
-  std::uint32_t code = 0;  ///< 0: no fault; 1 to 127: as Faults.FirstCause; from 128 on, a processor exception plus 128.
+  std::uint32_t code = 0;  ///< 0: no fault; 1 to 126: as Faults.FirstCause; from 128 on, a processor exception plus 128.
+  static constexpr std::uint32_t code_new_image_not_confirmed = 127;
   static constexpr SignalLayout time_layout = {24, 32, false, 1.0F, 0.0F, 0.0F, 4294967295.0F, false, 0};
   std::uint32_t time = 0;  ///< [s] Since 1970-01-01 UTC. A value below 946684800 is the time in operation: the calendar clock was not set.
   static constexpr SignalLayout number_layout = {56, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
@@ -2303,7 +2304,7 @@ struct StoredFault {
   template <class See>
   static void each_in_words(See&& see) {
     see("Index", "0: the newest fault.", std::span<const ValueName>());
-    see("Code", "0: no fault; 1 to 127: as Faults.FirstCause; from 128 on, a processor exception plus 128.", std::span<const ValueName>());
+    { static constexpr std::array<ValueName, 1> names{{ValueName{127, "new image not confirmed"}}}; see("Code", "0: no fault; 1 to 126: as Faults.FirstCause; from 128 on, a processor exception plus 128.", std::span<const ValueName>(names)); }
     see("Time", "Since 1970-01-01 UTC. A value below 946684800 is the time in operation: the calendar clock was not set.", std::span<const ValueName>());
     see("Number", "Number of the fault since the first start, low 8 bits. Frames with the same number belong together.", std::span<const ValueName>());
   }

@@ -87,26 +87,35 @@ inline Change patched(const std::string& function, firmware::UnicornBoard::Instr
   };
 }
 
-inline std::string container(std::uint8_t slot, std::uint32_t version, const Change& change = change_nothing,
-                             const std::string& key = "product") {
+inline update::Container signed_image(std::uint8_t slot, std::uint32_t version, const Change& change = change_nothing,
+                                      const std::string& key = "product") {
   update::Payload p = update::read_linked_image(image_in(slot));
   change(p.bytes, slot);
   std::ranges::copy(std::string("stm32f405_forklift"), p.header.board.begin());
   p.header.version = version;
   p.header.security_version = 1;
-  return sign({p}, key_of(key)).front().bytes;
+  return sign({p}, key_of(key)).front();
+}
+inline std::string container(std::uint8_t slot, std::uint32_t version, const Change& change = change_nothing,
+                             const std::string& key = "product") {
+  return signed_image(slot, version, change, key).bytes;
 }
 
 /// Version 0.2.0 in slot A, confirmed; in slot B what a transfer has left there.
 class LoaderBoard {
  public:
-  explicit LoaderBoard(std::uint32_t seed = 1) : board(loader(), {image_in(0), image_in(1)}, seed) {
+  explicit LoaderBoard(std::uint32_t seed = 1, const std::string& runs = container(0, 0x000200))
+      : board(loader(), {image_in(0), image_in(1)}, seed) {
     board.may_start_again = true;
-    fill(0, container(0, 0x000200), true);
+    fill(0, runs, true);
     load();
   }
   void put_on_trial(const std::string& bytes) {
     fill(1, bytes, false);
+    load();
+  }
+  void erase_target() {
+    prepare(slots_, 1);
     load();
   }
   /// Looks ten times a second; false if it took longer.

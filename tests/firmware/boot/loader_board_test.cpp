@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 
 #include "hal/sample_frames.hpp"
+#include "storage/persistence.hpp"
 #include "tests/firmware/boot/loader_board.hpp"
+#include "tests/firmware/storage/flash_model.hpp"
 
 namespace bms::boot {
 namespace {
@@ -81,6 +83,21 @@ const Bad bad_images[] = {
     {"does not see what it measures", patched("bms::hal::can_receive(", Board::returns), 75},
 };
 
+/// 127 in the DBC file.
+constexpr std::uint16_t not_confirmed = 127;
+std::uint16_t newest_stored_fault(const firmware::UnicornBoard& board) {
+  using Stored = firmware::FlashControllerModel;
+  FlashModel model({Stored::sectors, Stored::sector_bytes}, 1);
+  for (std::uint32_t k = 0; k < Stored::sectors; ++k)
+    model.fill(k, {board.flash.bytes.begin() + k * Stored::sector_bytes,
+                   board.flash.bytes.begin() + (k + 1) * Stored::sector_bytes});
+  plug_in(&model);
+  storage::Persistence p;
+  p.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
+  plug_in(nullptr);
+  return p.events().last(0).code;
+}
+
 class BadImage : public ::testing::TestWithParam<int> {};
 
 /// The longest time of the watchdog that the loader starts is 8 s at 17 kHz: 15 s.
@@ -101,6 +118,8 @@ TEST_P(BadImage, IsReplacedByTheOldOne) {
   std::printf("%s: the old one after %.2f s\n", bad.what, 1e-3 * (battery.board.now_ms() - began_ms));
   EXPECT_TRUE(battery.marks(1).rejected);
   EXPECT_FALSE(battery.marks(1).confirmed);
+  EXPECT_TRUE(battery.run_until([&] { return newest_stored_fault(battery.board) == not_confirmed; }, 2'000))
+      << "the stored faults do not say so";
   battery.board.reset(by_software);
   ASSERT_TRUE(battery.board.run_until([&] { return battery.running() != 2; }, 2'000));
   EXPECT_EQ(battery.running(), 0) << "and it stays";

@@ -1,6 +1,8 @@
 // Whole updates between the tool's client and the battery's server, on a bus in memory that can lose frames.
 #include "boot/update_server.hpp"
 
+#include <chrono>
+
 #include "boot/flash_map.hpp"
 #include "tests/firmware/boot/bench.hpp"
 #include "update/update_run.hpp"
@@ -16,19 +18,19 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   VirtualBattery() {
     bench_.produce({.version = 0x000200, .security_version = 5, .seed = 7});
     bench_.battery();
-    restart();
+    start(true);
   }
 
   bool rest = true, healthy = true;
-  int frames_until_lost = -1;  ///< then the connection is lost once
+  int requests_until_restart = 0;  ///< it still answers so many; -1: it does not restart
+  int frames_until_lost = -1;      ///< then the connection is lost once
   Bench& bench() { return bench_; }
   const UpdateServer& server() const { return *server_; }
 
   std::size_t read(std::span<monitor::BusFrame> room, int) override {
-    now_us_ += 500;
     std::size_t n = 0;
     can::Frame frame;
-    while (n < room.size() && !lost_ && node_->next_frame(frame, now_us_)) {
+    while (n < room.size() && !lost_ && node_->next_frame(frame, now_us())) {
       room[n].kind = monitor::FrameKind::standard;
       room[n].id = frame.id;
       room[n].length = frame.length;
@@ -41,17 +43,26 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   bool live() const override { return true; }
   bool send(const can::Frame& frame) override {
     if (frames_until_lost >= 0 && frames_until_lost-- == 0) lost_ = true;
-    if (!lost_) node_->receive(frame, now_us_);
+    if (!lost_) node_->receive(frame, now_us());
+    if (restart_in_ > 0 && frame.data[0] < 0x10 && --restart_in_ == 0) start(false);
     return !lost_;
   }
   void connect_again() { lost_ = false; }
   void power_cut() { start(true); }
 
  private:
+  using Clock = std::chrono::steady_clock;
+  std::uint64_t now_us() const {
+    return static_cast<std::uint64_t>(
+        std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - started_at_).count());
+  }
   // UpdateSurroundings
   bool at_rest() override { return rest; }
   std::uint64_t challenge() override { return ++challenge_; }
-  void restart() override { start(false); }
+  void restart() override {
+    if (requests_until_restart == 0) start(false);
+    restart_in_ = requests_until_restart;
+  }
   void start(bool power_on) {
     started_ = bench_.reset(power_on);
     if (started_.trial && healthy) {
@@ -63,14 +74,17 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
     server_ = std::make_unique<UpdateServer>(bench_.slots(), bench_.battery(), started_,
                                              authentication::role_key(device, authentication::Role::service), *this);
     next_node_ = std::make_unique<UpdateNode>(*server_, *this);
-    node_.swap(next_node_);  // the old one may be the caller
+    node_.swap(next_node_);                                               // the old one may be the caller
+    started_at_ = Clock::now() - std::chrono::minutes(power_on ? 1 : 0);  // then it waits for an update
   }
 
   Bench bench_;
   Start started_;
   std::unique_ptr<UpdateServer> server_;
   std::unique_ptr<UpdateNode> node_, next_node_;
-  std::uint64_t now_us_ = 0, challenge_ = 41;
+  std::uint64_t challenge_ = 41;
+  Clock::time_point started_at_{};
+  int restart_in_ = 0;
   bool lost_ = false;
 };
 
@@ -113,6 +127,23 @@ TEST_F(UpdateServerTest, AnImageThatDoesNotConfirmItselfIsReportedAsReturned) {
   const auto result = run(wish());
   EXPECT_EQ(result.outcome, Outcome::returned);
   EXPECT_EQ(battery_.bench().reset(true).slot, 0);
+}
+
+TEST_F(UpdateServerTest, AnswersFromBeforeTheRestartSayNothingAboutTheNewImage) {
+  battery_.requests_until_restart = 5;
+  auto w = wish();
+  w.start_wait_s = 10;  // one answer is lost in the restart
+  const auto result = run(w);
+  EXPECT_EQ(result.outcome, Outcome::done) << result.reason;
+}
+
+TEST_F(UpdateServerTest, ABatteryThatDoesNotRestartIsNotSaidToHaveReturned) {
+  battery_.requests_until_restart = -1;
+  auto w = wish();
+  w.start_wait_s = 10;
+  const auto result = run(w);
+  EXPECT_EQ(result.outcome, Outcome::refused);
+  EXPECT_EQ(result.reason, "the battery has not restarted: the image is complete and starts at its next restart");
 }
 
 TEST_F(UpdateServerTest, ALostConnectionIsResumedWhereItEnded) {

@@ -1,0 +1,345 @@
+// A whole update of the forklift board in Unicorn: loader, running image and new image are the real ones, the tool's
+// side is that of bms update, on a bus of 250 kbit/s. Its operations of the flash are recorded. The losses of power
+// begin from them: the flash as it was after so many operations, with the next one torn, and a start of the chip.
+//
+// BMS_UPDATE_CUTS: number of losses of power, 40 without it.
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+
+#include "can/generated/can_messages.hpp"
+#include "storage/persistence.hpp"
+#include "tests/firmware/boot/board_bus.hpp"
+#include "tests/firmware/storage/flash_model.hpp"
+#include "update/update_run.hpp"
+
+namespace bms::boot {
+namespace {
+
+using Operation = firmware::FlashControllerModel::Operation;
+using Stored = firmware::FlashControllerModel;
+using ::testing::IsEmpty;
+
+constexpr std::uint32_t one_time_begin = 0x1FFF'7800, one_time_bytes = 32, by_power = 1U << 27 | 1U << 26 | 1U << 25;
+
+/// All flash of the chip but the loader's.
+struct Contents {
+  std::vector<std::uint8_t> stored = std::vector<std::uint8_t>(Stored::sectors * Stored::sector_bytes, 0xFF);
+  std::vector<std::uint8_t> slots = std::vector<std::uint8_t>(2 * application_slot_bytes, 0xFF);
+  std::vector<std::uint8_t> one_time = std::vector<std::uint8_t>(one_time_bytes, 0xFF);
+
+  std::span<std::uint8_t> place(const Operation& o) {
+    if (o.address >= one_time_begin) return std::span(one_time).subspan(o.address - one_time_begin, o.bytes);
+    if (o.address >= application_slots[0]) return std::span(slots).subspan(o.address - application_slots[0], o.bytes);
+    return std::span(stored).subspan(o.address - Stored::memory, o.bytes);
+  }
+  void apply(const Operation& o) {
+    const auto bytes = place(o);
+    for (std::size_t k = 0; k < bytes.size(); ++k)
+      bytes[k] = o.bytes > 4 ? 0xFF : bytes[k] & static_cast<std::uint8_t>(o.value >> 8 * k);
+  }
+  /// The operation in which the power failed: of its bits any may have changed already.
+  void tear(const Operation& o, std::mt19937& random) {
+    const auto bytes = place(o);
+    for (std::size_t k = 0; k < bytes.size(); ++k) {
+      const auto any = static_cast<std::uint8_t>(random());
+      bytes[k] = o.bytes > 4 ? any : bytes[k] & (any | static_cast<std::uint8_t>(o.value >> 8 * k));
+    }
+  }
+  std::span<const std::uint8_t> slot(std::uint8_t which) const {
+    return std::span(slots).subspan(which * application_slot_bytes, application_slot_bytes);
+  }
+};
+
+Contents contents_of(firmware::UnicornBoard& board) {
+  Contents c;
+  c.stored = board.flash.bytes;
+  c.slots = board.read_flash(application_slots[0], 2 * application_slot_bytes);
+  c.one_time = board.read_flash(one_time_begin, one_time_bytes);
+  return c;
+}
+
+// ---- what a battery in the field has stored ----
+
+constexpr std::uint16_t some_key = 0x7A, some_fault = 9;
+constexpr std::int32_t some_value = -12'345;
+
+void start(storage::Persistence& p, FlashModel& model, const std::vector<std::uint8_t>& bytes) {
+  for (std::uint32_t k = 0; k < Stored::sectors; ++k)
+    model.fill(k, {bytes.begin() + k * Stored::sector_bytes, bytes.begin() + (k + 1) * Stored::sector_bytes});
+  plug_in(&model);
+  p.start(hal::ResetCause::power_on, std::nullopt, std::nullopt);
+}
+
+/// A record of each kind that an update must not lose.
+std::vector<std::uint8_t> years_of_use() {
+  FlashModel model({Stored::sectors, Stored::sector_bytes}, 1);
+  storage::Persistence p;
+  start(p, model, std::vector<std::uint8_t>(Stored::sectors * Stored::sector_bytes, 0xFF));
+  EXPECT_TRUE(p.set(some_key, some_value));
+  p.observe({});
+  p.fault(some_fault);
+  p.action({.code = 3, .operator_number = 42, .argument = 7}, std::nullopt);
+  measurement::Sample s;
+  s.current_ua = 10'000'000;
+  storage::EstimatorSnapshot now;
+  now.pack = estimator::StoredEstimate{};
+  now.pack->soc_ppb = 612'000'000;
+  now.pack->soc_sigma_ppb = 20'000'000;
+  for (int minute = 0; minute < 3; ++minute) {  // 10 A
+    for (int k = 0; k < 61; ++k, s.time_us += 1'000'000) p.count(s);
+    p.store(now, std::nullopt);
+  }
+  p.power_failing(now, std::nullopt);
+  std::vector<std::uint8_t> all;
+  for (std::uint32_t k = 0; k < Stored::sectors; ++k) std::ranges::copy(model.bytes(k), std::back_inserter(all));
+  plug_in(nullptr);
+  return all;
+}
+
+storage::ChargeRecord charge_in(const std::vector<std::uint8_t>& bytes) {
+  FlashModel model({Stored::sectors, Stored::sector_bytes}, 1);
+  storage::Persistence p;
+  start(p, model, bytes);
+  plug_in(nullptr);
+  return p.charge();
+}
+
+/// The charge before the interrupted write of records, and after it.
+struct Charges {
+  storage::ChargeRecord before, after;
+};
+
+void expect_nothing_lost(const std::vector<std::uint8_t>& bytes, const Charges& charges, const std::string& when) {
+  FlashModel model({Stored::sectors, Stored::sector_bytes}, 1);
+  storage::Persistence p;
+  start(p, model, bytes);
+  plug_in(nullptr);
+  EXPECT_EQ(p.settings().get(some_key), some_value) << when;
+  bool fault = false;
+  for (std::uint32_t k = 0; k < storage::EventsRecord::max_faults; ++k)
+    fault = fault || p.events().last(k).code == some_fault;
+  EXPECT_TRUE(fault) << when;
+  bool action = false;
+  for (std::uint32_t k = 0; k < 16; ++k) action = action || p.actions().last(k).operator_number == 42;
+  EXPECT_TRUE(action) << when;
+  EXPECT_TRUE(p.charge() == charges.before || p.charge() == charges.after) << when;
+}
+
+// ---- one update without a disturbance ----
+
+struct Update {
+  std::vector<update::Container> images;  ///< 0.2.0 in slot A, 0.3.0 in slot B
+  Contents before;
+  std::vector<Operation> operations;
+  std::size_t confirmed_at = 0;  ///< operations until the new image has confirmed itself
+  update::UpdateResult result;
+  double seconds = 0, sending_s = 0, load = 0;  ///< load: of the bus, while the container is sent
+  std::vector<firmware::SeenFrame> sent;        ///< by the board meanwhile
+};
+
+/// The last 1,024 bytes of a slot are its marks.
+std::size_t operations_until_confirmed(const Update& u) {
+  Contents c = u.before;
+  SlotBytes slots;
+  constexpr std::uint32_t end = application_slots[1] + application_slot_bytes;
+  for (std::size_t k = 0; k < u.operations.size(); ++k) {
+    const Operation& o = u.operations[k];
+    c.apply(o);
+    if (o.bytes != 4 || o.address >= end || o.address < end - trailer_bytes) continue;
+    std::ranges::copy(c.slot(1), slots.slots[1].begin());
+    if (read_marks(slots, 1).confirmed) return k + 1;
+  }
+  return 0;
+}
+
+const Update& the_update() {
+  static const Update update = [] {
+    Update u;
+    u.images = {signed_image(0, 0x000200), signed_image(1, 0x000300)};
+    LoaderBoard battery(1, u.images[0].bytes);
+    battery.board.longest_sleep_us = 500;
+    battery.board.flash.bytes = years_of_use();
+    u.before = contents_of(battery.board);
+    battery.board.flash.on_operation = [&](const Operation& o) { u.operations.push_back(o); };
+    BoardBus bus(battery.board);
+    bus.pass(1'000);
+    bus.load_bus(0.5);
+    std::uint64_t first_bit = 0, last_bit = 0;
+    update::UpdateWish wish;
+    wish.progress = [&](std::uint32_t, std::uint32_t) {
+      last_bit = battery.board.can.now_bit;
+      if (first_bit == 0) first_bit = last_bit;
+    };
+    wish.containers = u.images;
+    wish.start_wait_s = 300;
+    const double began_ms = battery.board.now_ms();
+    u.result = run_update(bus, wish);
+    u.seconds = 1e-3 * (battery.board.now_ms() - began_ms);
+    u.sending_s = static_cast<double>(last_bit - first_bit) / battery.board.can.bits_per_second;
+    std::uint64_t busy = 0;
+    for (const auto& f : battery.board.can.seen) {
+      if (f.begin_bit < first_bit || f.end_bit > last_bit) continue;
+      busy += f.end_bit - f.begin_bit;
+      if (f.from_board) u.sent.push_back(f);
+    }
+    u.load = static_cast<double>(busy) / static_cast<double>(last_bit - first_bit);
+    u.confirmed_at = operations_until_confirmed(u);
+    EXPECT_THAT(battery.board.flash.violations, IsEmpty());
+    EXPECT_THAT(battery.board.can.violations, IsEmpty());
+    return u;
+  }();
+  return update;
+}
+
+TEST(UpdateOfTheBoard, WhatTheTestTakesForStoredIsThere) {
+  const auto charge = charge_in(years_of_use());
+  EXPECT_GE(charge.charged_uah, 500'000U);
+  EXPECT_GE(charge.operating_s, 180U);
+  EXPECT_EQ(charge.pack.soc_ppb, 612'000'000);
+}
+
+TEST(UpdateOfTheBoard, TheRealImageIsSentStartedAndConfirmed) {
+  const Update& u = the_update();
+  EXPECT_EQ(u.result.outcome, update::UpdateResult::Outcome::done) << u.result.reason;
+  EXPECT_EQ(u.result.from, "0.2.0");
+  std::printf("%zu bytes: sent in %.1f s, whole update %.1f s, %zu operations of the flash\n", u.images[1].bytes.size(),
+              u.sending_s, u.seconds, u.operations.size());
+  EXPECT_GT(u.confirmed_at, 0U);
+}
+
+/// Cycles of the DBC file.
+template <class... Messages>
+std::map<std::uint32_t, double> cycles_ms() {
+  return {{std::uint32_t{Messages::id}, 1e-3 * Messages::cycle_us}...};
+}
+
+TEST(UpdateOfTheBoard, NoCyclicMessageIsLateByTheTransfer) {
+  const Update& u = the_update();
+  const auto cycles = cycles_ms<can::Identity, can::CurrentLimits, can::Health, can::CellVoltages1, can::CellVoltages4,
+                                can::CellExtremes, can::Temperatures, can::Faults, can::MoreFaults, can::ContactorState,
+                                can::AllowedCurrent, can::Storage, can::Board>();
+  EXPECT_GT(u.load, 0.5);
+  double worst = 0;
+  for (const auto& [id, cycle_ms] : cycles) {
+    ASSERT_GT(cycle_ms, 0) << id;
+    double last_ms = 0, longest_ms = 0;
+    int n = 0;
+    for (const auto& f : u.sent) {
+      if (f.frame.id != id) continue;
+      const double ms = 1e3 * static_cast<double>(f.end_bit) / 250e3;
+      if (n++ > 0) longest_ms = std::max(longest_ms, ms - last_ms);
+      last_ms = ms;
+    }
+    EXPECT_GE(n, u.sending_s * 1e3 / cycle_ms - 1) << fmt::format("{:03x}", id);
+    EXPECT_LT(longest_ms, 1.5 * cycle_ms) << fmt::format("{:03x}", id);
+    worst = std::max(worst, longest_ms / cycle_ms);
+  }
+  std::printf("%zu cyclic messages at %.0f %% load of the bus: at most %.2f cycles apart\n", cycles.size(),
+              100 * u.load, worst);
+}
+
+// ---- losses of power ----
+
+std::string part_of(const Operation& o) {
+  if (o.address >= one_time_begin) return "counter";
+  if (o.address < application_slots[0]) return "stored data";
+  if (o.bytes > 4) return "erase";
+  return (o.address - application_slots[0]) % application_slot_bytes < application_slot_bytes - trailer_bytes
+             ? "transfer"
+             : "marks";
+}
+
+class Cuts {
+ public:
+  Cuts() : battery_(1, the_update().images[0].bytes), bus_(battery_.board) {
+    battery_.board.longest_sleep_us = 500;
+    for (std::size_t k = 0; k < the_update().operations.size(); ++k)
+      parts_[part_of(the_update().operations[k])].push_back(k);
+  }
+
+  void one(unsigned number) {
+    std::mt19937 random(number);
+    const auto part = std::next(parts_.begin(), static_cast<long>(number % parts_.size()));
+    const std::size_t k = part->second[random() % part->second.size()];
+    when_ = fmt::format("cut {} in operation {}: {}", number, k, part->first);
+    ++by_part_[part->first];
+    Contents c = the_update().before;
+    for (std::size_t i = 0; i < k; ++i) c.apply(the_update().operations[i]);
+    charges_.before = charge_in(c.stored);
+    Contents after = c;
+    for (std::size_t i = k; i < the_update().operations.size() && part_of(the_update().operations[i]) == "stored data";)
+      after.apply(the_update().operations[i++]);
+    charges_.after = charge_in(after.stored);
+    c.tear(the_update().operations[k], random);
+    start(c, random() % 2 == 0 ? static_cast<int>(random() % 4) : -1);
+    const std::uint8_t runs = check_image(k);
+    if (number % 20 != 0 || ::testing::Test::HasFailure()) return;
+    // The image works on: it opens the stored data and sends.
+    bus_.pass(1'500);
+    EXPECT_EQ(battery_.running(), runs) << when_;
+    EXPECT_TRUE(std::ranges::any_of(battery_.board.can.seen, [](const auto& f) {
+      return f.from_board && f.frame.id == can::PackState::id;
+    })) << when_;
+    expect_nothing_lost(battery_.board.flash.bytes, charges_, when_);
+  }
+  const std::map<std::string, unsigned>& by_part() const { return by_part_; }
+  unsigned in_starts() const { return in_starts_; }
+
+ private:
+  void start(const Contents& c, int operations_to_the_next_cut) {
+    firmware::UnicornBoard& board = battery_.board;
+    board.can.seen.clear();
+    board.flash.bytes = c.stored;
+    board.write_flash(application_slots[0], c.slots);
+    board.write_flash(one_time_begin, c.one_time);
+    board.flash.operations_to_power_loss = operations_to_the_next_cut;
+    const std::size_t before = board.resets.size();
+    board.reset(by_power);
+    ASSERT_TRUE(board.run_until([&] { return battery_.running() != 2; }, 6'000)) << when_ << ": no image runs";
+    in_starts_ += static_cast<unsigned>(board.resets.size() - before - 1);
+    board.flash.operations_to_power_loss = -1;
+  }
+  /// What runs is what was signed, complete; after the new image has confirmed itself, it is that one.
+  std::uint8_t check_image(std::size_t k) {
+    const std::uint8_t runs = battery_.running();
+    if (runs > 1) return runs;
+    const std::string& signed_bytes = the_update().images[runs].bytes;
+    EXPECT_TRUE(std::ranges::equal(battery_.board.read_flash(application_slots[runs], signed_bytes.size()),
+                                   bytes_of(signed_bytes)))
+        << when_;
+    const bool confirmed = k >= the_update().confirmed_at;
+    EXPECT_TRUE(runs == 1 || !confirmed) << when_ << ": older than what was confirmed";
+    expect_nothing_lost(battery_.board.flash.bytes, charges_, when_);
+    return runs;
+  }
+
+  LoaderBoard battery_;
+  BoardBus bus_;
+  std::map<std::string, std::vector<std::size_t>> parts_;
+  std::map<std::string, unsigned> by_part_;
+  unsigned in_starts_ = 0;
+  Charges charges_;
+  std::string when_;
+};
+
+TEST(UpdateOfTheBoard, AfterEveryLossOfPowerOneOfTheImagesRunsAndNoRecordIsLost) {
+  const char* wanted = std::getenv("BMS_UPDATE_CUTS");
+  const int cuts = wanted != nullptr ? std::atoi(wanted) : 40;
+  Cuts all;
+  for (int k = 0; k < cuts && !HasFailure(); ++k) {
+    all.one(static_cast<unsigned>(k));
+    if (k % 200 == 199) std::fprintf(stderr, "%d cuts, %u in the start after one\n", k + 1, all.in_starts());
+  }
+  for (const auto& [part, n] : all.by_part()) {
+    std::printf("%6u cuts: %s\n", n, part.c_str());
+    EXPECT_GT(n, 0U);
+  }
+  std::printf("%6u cuts in the start after one\n", all.in_starts());
+  EXPECT_EQ(all.by_part().size(), 5U);
+  EXPECT_GT(all.in_starts(), 0U);
+}
+
+}  // namespace
+}  // namespace bms::boot
