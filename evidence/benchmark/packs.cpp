@@ -10,14 +10,13 @@
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
 
+#include "benchmark/pack_run.hpp"
 #include "benchmark/pack_score.hpp"
 #include "benchmark/truth/case_files.hpp"
 #include "benchmark/truth/packs.hpp"
 #include "files/bad_input.hpp"
-#include "files/cell_file.hpp"
 #include "files/committed_figures.hpp"
 #include "files/text_file.hpp"
-#include "workflow/pack_diagnosis.hpp"
 
 namespace {
 
@@ -33,42 +32,6 @@ struct Options {
   std::string json, only, readme, write;
 };
 
-bms::measurement::Recording recording_of(const truth::PackSeries& s) {
-  bms::measurement::Recording r;
-  r.time_s = s.time_s;
-  r.current_a = s.current_a;
-  for (const auto& v : s.cell_v) r.cell_voltage_v.emplace_back(v);
-  for (const auto& t : s.sensor_c) r.cell_temperature_c.emplace_back(t);
-  if (!s.pack_v.empty()) r.pack_voltage_v = s.pack_v;
-  return r;
-}
-
-PackOutcome run_pack(const truth::PackCase& c, bool shared) {
-  bms::workflow::PackOptions options;
-  options.shared = shared;
-  options.initial_soc = c.given_initial_soc;
-  const auto cell = bms::files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
-  const bms::workflow::PackResult r = bms::workflow::diagnose_pack(cell, recording_of(c.recording), options);
-  PackOutcome o = bms::benchmark::score_pack(c, r.diagnosis);
-  o.wall_s = r.wall_s;
-  return o;
-}
-
-const char* word_for(const bms::benchmark::PlantedOutcome& p) {
-  if (p.named) return "right ";
-  return p.listed ? "listed" : "missed";
-}
-
-void print(const PackOutcome& o) {
-  fmt::print("{} ({} cells, {:.0f} h, {:.0f} s): {}\n", o.name, o.cells, o.hours, o.wall_s, o.verdict);
-  for (const auto& p : o.planted)
-    fmt::print("  {} {} {} {:.4g} (limit {:.4g}){}\n", word_for(p), p.fault.id,
-               p.fault.cell ? fmt::format("{}", *p.fault.cell + 1) : "-", p.fault.size, p.limit,
-               p.named ? fmt::format(", found {:.4g}, {:+.1f} sigma", p.found, p.pull) : "  " + p.instead);
-  for (const std::string& text : o.wrong) fmt::print("  wrong {}\n", text);
-  std::fflush(stdout);
-}
-
 void write_case(const std::filesystem::path& folder, std::size_t k, const truth::PackCase& c) {
   const std::string name = fmt::format("{}_{}", c.name.ends_with("healthy") ? "healthy" : "pack", k + 1);
   bms::files::write_file((folder / (name + ".csv")).string(), truth::csv_of(c.recording));
@@ -79,30 +42,6 @@ void write_case(const std::filesystem::path& folder, std::size_t k, const truth:
 void reverse(truth::PackCase& c) {
   for (double& a : c.recording.current_a) a = -a;
   c.faults.push_back({.id = "current_sign", .cell = {}, .size = 1});
-}
-
-/// Rows of `rows_s`: voltages and temperatures of their last moment, the mean of the current.
-void slow_down(truth::PackSeries& s, double rows_s) {
-  truth::PackSeries slow = s;
-  const auto of_rows = [&](const std::vector<double>& column, bool mean) {
-    std::vector<double> values;
-    double sum = 0, count = 0, since_s = s.time_s.front();
-    for (std::size_t k = 0; k < column.size(); ++k) {
-      sum += column[k];
-      ++count;
-      if (s.time_s[k] - since_s < rows_s && k > 0) continue;
-      values.push_back(mean ? sum / count : column[k]);
-      sum = count = 0;
-      since_s = s.time_s[k];
-    }
-    return values;
-  };
-  slow.time_s = of_rows(s.time_s, false);
-  slow.current_a = of_rows(s.current_a, true);
-  for (auto* columns : {&slow.cell_v, &slow.sensor_c})
-    for (auto& column : *columns) column = of_rows(column, false);
-  slow.pack_v = of_rows(s.pack_v, false);
-  s = std::move(slow);
 }
 
 void run(const Options& o) {
@@ -116,11 +55,11 @@ void run(const Options& o) {
       const std::size_t index = o.first + (healthy ? k - o.faulty : k);
       truth::PackCase c = truth::make_pack(o.seed, index, healthy, o.only);
       if (o.reversed) reverse(c);
-      if (o.rows_s > 0) slow_down(c.recording, o.rows_s);
+      if (o.rows_s > 0) truth::slow_down(c.recording, o.rows_s);
       if (!o.write.empty()) write_case(o.write, index, c);
-      outcomes[k] = run_pack(c, !o.no_shared);
+      outcomes[k] = bms::benchmark::run_pack(c, !o.no_shared);
       const std::scoped_lock lock(printing);
-      print(outcomes[k]);
+      bms::benchmark::print(outcomes[k]);
     }
   };
   std::vector<std::thread> threads;

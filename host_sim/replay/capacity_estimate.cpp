@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include <fmt/format.h>
@@ -66,8 +67,11 @@ class Stretches {
         estimator::voltage_missing | estimator::voltage_implausible | estimator::voltage_stuck;
     if ((e.flags & unusable) != 0 || std::isnan(r_.recording.voltage_v[k])) return;
     const auto at = model::look_up(cell_, e.soc, interval_);
-    const double drop_v = model::OneRc<double>::voltage({}, at, {current_a, 0}) -
-                          model::OneRc<double>::voltage({}, at, {0, 0}) + e.v_rc_v;
+    const double rested_v = model::OneRc<double>::voltage({}, at, {0, 0});
+    // an extended cell file's mechanisms have no value of their own in a row, but are part of the prediction
+    const double drop_v = r_.cell.mechanisms.empty()
+                              ? model::OneRc<double>::voltage({}, at, {current_a, 0}) - rested_v + e.v_rc_v
+                              : e.voltage_predicted_v - rested_v;
     sum_.charge_ah += charge_ah;
     sum_.ocv_v += r_.recording.voltage_v[k] - drop_v;
     sum_.sigma_v += std::abs(drop_v);
@@ -207,6 +211,8 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   const double counted_ah = highest.charge_ah - lowest.charge_ah,
                drift_ah = r.cell.parameters.noise.current_offset_a * r.recording.duration_s() / 3'600;
   const double sigma = std::hypot(spread, gain_share * mean, mean * drift_ah / std::max(1e-9, counted_ah));
+  if (!std::isfinite(mean) || !std::isfinite(sigma))
+    throw std::runtime_error("the capacity is not a finite number, so that there is no answer");
   const bool at_bound = mean - 2 * spread < least_ratio * file_ah || mean + 2 * spread > most_ratio * file_ah;
   if (at_bound || sigma > known_to * mean) return std::nullopt;
   return CapacityEstimate{mean, sigma};

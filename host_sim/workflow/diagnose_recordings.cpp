@@ -18,6 +18,7 @@
 #include "measurement/recording_checks.hpp"
 #include "measurement/soc_column_text.hpp"
 #include "workflow/diagnosis_comparison.hpp"
+#include "workflow/finite_answer.hpp"
 #include "workflow/next_steps.hpp"
 
 namespace bms::workflow {
@@ -199,6 +200,7 @@ DiagnoseResult diagnose_recordings(DiagnoseInput input, const diagnosis::Options
     r.diagnosis = std::move(*fault);
   else
     r.diagnosis = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, records, with_healthy);
+  require_finite(r.diagnosis);
   diagnosis::describe(r.diagnosis, r.cell.parameters, records);
   for (const std::string& text : r.diagnosis.warnings) r.warnings.push_back({"readings", text});
   compare_recordings(r);

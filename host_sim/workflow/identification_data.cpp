@@ -8,11 +8,20 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "measurement/statistics.hpp"
 
 namespace bms::workflow {
 
 namespace {
 
+/// Of single odd voltages.
+struct OddReadings {
+  double quiet = 0.01;     ///< change of the current, as a share of the largest current
+  double least_v = 0.005;  ///< from the voltages before and after,
+  double times = 12;       ///< and so many times the usual change from row to row
+  double most = 0.01;      ///< share of the rows: more are noise
+};
+constexpr OddReadings of_odd_readings{};
 constexpr std::size_t least_samples = 10;  ///< in the window; as in a recording
 
 std::optional<double> number(std::string_view text) {
@@ -95,6 +104,36 @@ void leave_out(const LeftOutTime& time, measurement::Recording& r) {
   for (std::size_t k = 0; k < r.rows(); ++k) {
     if (r.time_s[k] >= time.from_s && r.time_s[k] <= time.to_s) voltage_v[k] = std::numeric_limits<double>::quiet_NaN();
   }
+}
+
+void leave_out_odd_readings(measurement::Recording& r) {
+  const OddReadings& odd = of_odd_readings;
+  double most_a = 0;
+  for (const double a : r.current_a) most_a = std::max(most_a, std::isfinite(a) ? std::abs(a) : 0);
+  const auto& v = r.voltage_v;
+  const auto is_constant = [&](std::size_t k) {
+    const double before_a = r.current_a[k] - r.current_a[k - 1], after_a = r.current_a[k + 1] - r.current_a[k];
+    return std::abs(before_a) <= odd.quiet * most_a && std::abs(after_a) <= odd.quiet * most_a;  // false for NaN
+  };
+  std::vector<double> changes;
+  for (std::size_t k = 1; k + 1 < r.rows(); ++k) {
+    if (is_constant(k) && v[k] != v[k - 1]) changes.push_back(std::abs(v[k] - v[k - 1]));
+  }
+  const double usual_v = changes.empty() ? 0 : measurement::median(changes);
+  const double least_v = std::max(odd.least_v, odd.times * usual_v);
+  std::vector<std::size_t> found;
+  for (std::size_t k = 1; k + 1 < r.rows(); ++k) {
+    const double from_before = v[k] - v[k - 1], from_after = v[k] - v[k + 1];
+    const double apart_v = std::min(std::abs(from_before), std::abs(from_after));
+    const bool same_side = from_before * from_after > 0, agree = std::abs(v[k + 1] - v[k - 1]) < apart_v / 2;
+    if (is_constant(k) && same_side && agree && apart_v > least_v) found.push_back(k);
+  }
+  if (found.empty() || static_cast<double>(found.size()) > odd.most * static_cast<double>(r.rows())) return;
+  std::vector<double>& voltage_v = r.voltage_v.edit();
+  for (const std::size_t k : found) voltage_v[k] = std::numeric_limits<double>::quiet_NaN();
+  r.warnings.push_back({"odd_readings", fmt::format("single voltages that differ from those before and after them "
+                                                    "under the same current, left out: {}, the first at {:g} s",
+                                                    found.size(), r.time_s[found.front()])});
 }
 
 InitialSoc initial_soc_of(const std::string& text) {

@@ -46,6 +46,10 @@ struct LeftOutTime {
 /// Removes the voltage in that time; the current still flows.
 void leave_out(const LeftOutTime& time, measurement::Recording& recording);
 
+/// Removes single voltages between two that agree, under a constant current, and adds a warning with their number.
+/// Many of them are noise and stay.
+void leave_out_odd_readings(measurement::Recording& recording);
+
 /// Parses "estimate", a number from 0 to 1, or an empty text. Throws BadInput.
 InitialSoc initial_soc_of(const std::string& text);
 

@@ -13,6 +13,7 @@
 #include "files/recording.hpp"
 #include "identification/prefilter.hpp"
 #include "measurement/recording_checks.hpp"
+#include "workflow/finite_answer.hpp"
 #include "workflow/identified_cell.hpp"
 #include "workflow/learn_healthy.hpp"
 #include "workflow/reference_temperature.hpp"
@@ -80,6 +81,7 @@ Inputs read_inputs(const IdentifyOptions& options, StartCell& start, std::vector
   for (const std::string& path : options.recordings) {
     inputs.recordings.push_back(files::read_recording(path, files::VoltageColumn::required, options.reading));
     leave_out(options.left_out, inputs.recordings.back());
+    leave_out_odd_readings(inputs.recordings.back());
   }
   adapt_start(options, inputs.recordings, start, warnings);
   inputs.options = {options.initial_soc, options.window, start.cell.parameters};
@@ -246,6 +248,7 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   grey_box.ocv_ends_unmeasured = start.ocv.temperatures > 0;
   try {
     result.identification = id::identify_grey_box(started, main.data_sets, grey_box, options.method);
+    require_finite(result.identification);
     if (!options.extend) {  // else the joint fit replaces it
       for (const std::string& w : result.identification.warnings) result.warnings.push_back(warning_of(w));
     }

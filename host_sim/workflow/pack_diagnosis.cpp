@@ -20,6 +20,7 @@
 #include "measurement/statistics.hpp"
 #include "replay/replay.hpp"
 #include "workflow/diagnose_recordings.hpp"
+#include "workflow/finite_answer.hpp"
 
 namespace bms::workflow {
 
@@ -117,6 +118,8 @@ dp::PackRecording pack_of(const measurement::Recording& r, const files::CellFile
                          .cell_v = {},
                          .sensor_c = {},
                          .pack_v = r.pack_voltage_v.copy(),
+                         .single_readings = false,
+                         .count_walk = 0,
                          .charge_unknown = {}};
   for (const measurement::Column& c : r.cell_voltage_v) pack.cell_v.push_back(c.copy());
   for (const measurement::Column& c : r.cell_temperature_c) pack.sensor_c.push_back(c.copy());
@@ -159,6 +162,7 @@ void add_shared(PackResult& r, const std::optional<double>& initial_soc, const P
     if (progress) progress(cells_end + (1 - cells_end) * done, what);
   };
   diagnosis::Diagnosis d = diagnosis::diagnose(r.cell.parameters, r.cell.mechanisms, {c.record}, options);
+  require_finite(d);
   diagnosis::describe(d, r.cell.parameters, {c.record});
   r.shared = fmt::format("{}: {}", diagnosis::name_of(d.verdict), d.statement);
   const auto of_current = [](const dp::PackFinding& f) {
@@ -216,6 +220,7 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
     if (options.progress) options.progress(cells_end * done, what);
   };
   r.diagnosis = dp::diagnose_pack(cell.parameters, r.pack, of_cells);
+  require_finite(r.diagnosis);
   for (std::size_t c = 0; c < r.diagnosis.channels.cells.size(); ++c) {
     const std::size_t count = r.diagnosis.channels.cells[c].glitches;
     if (count > 0)

@@ -3,56 +3,19 @@
 
     field_cases.py TOOL [--only ID ...] [--page FILE.md] [--shared FOLDER]
 
-The inputs are made by field_inputs.py. Logs that people published are used as well where a folder has them
-(--shared), and are skipped with a word where it has not. Exit status 1 if an expectation failed."""
+More cases are in field_batteries.py; field_inputs.py makes the inputs. Logs that people published are used as well
+where a folder has them (--shared), and are skipped with a word where it has not. Exit status 1 if an expectation
+failed."""
 import argparse
 import gzip
+import importlib
 import pathlib
 import random
 import sys
 
 import field_inputs as make
+from field_steps import BUS, CASES, bus, case, column, diagnoses_pack, lfp, mechanisms, reads
 from walk import ROOT, Walk
-
-CASES = []
-BUS = "--dbc bus.dbc --map current_a=Current --map voltage_v=CellVoltage"
-
-
-def case(ident, what, hoped, before):
-    def register(steps):
-        CASES.append((ident, what, hoped, before, steps))
-        return steps
-    return register
-
-
-def bus(w, text="", name="bus.dbc"):
-    w.writes(name, make.DBC_HEAD + make.DBC_PACK + text)
-
-
-def reads(w, command, pattern=r"\b600 rows"):
-    w.runs(command)
-    w.exits(0)
-    w.sees(pattern)
-
-
-def column(w, name, heading):
-    lines = [line for line in w.text(name).splitlines() if not line.startswith("#")]
-    at = lines[0].split(",").index(heading)
-    return [line.split(",")[at] for line in lines[1:]]
-
-
-def lfp(w, capacity_ah):
-    w.runs(f"bms cell scale a123_26650 --capacity-ah {capacity_ah} --out lfp.toml")
-
-
-def diagnoses_pack(w, rows, more="", cell="lfp.toml", soc=None):
-    w.writes("pack.csv", make.pack_csv(rows, soc))
-    w.runs(f"bms diagnose --pack {cell} --recording pack.csv --json d.json {more}".rstrip())
-
-
-def mechanisms(w):
-    return [(m["id"], m["cell"]) for m in w.json("d.json")["mechanisms"]] if w.has("d.json") else None
-
 
 # --- CAN
 
@@ -544,6 +507,7 @@ def main():
     options.add_argument("--page")
     options.add_argument("--shared", default=ROOT.parent / "shared" / "field_cases", type=pathlib.Path)
     o = options.parse_args()
+    importlib.import_module("field_batteries")
     lines, failed = [], 0
     entries = CASES + [("published", "exports of testers that people published", "read", "partly refused",
                         lambda w: published(w, o.shared))]

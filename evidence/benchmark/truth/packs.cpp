@@ -48,17 +48,45 @@ struct Build {
   std::uint64_t seed = 0;
 };
 
-Build draw_build(std::uint64_t seed, plant::Random& random) {
+std::vector<double> draw_profile_a(const Build& b, const SlowLog* log, plant::Random& random) {
+  const double one_c_v = b.cell.capacity_ah * (b.cell.r0_ohm.at(0.5) + b.cell.r1_ohm.at(0.5));
+  const double fastest_charge = std::min(2.0, 0.27 / one_c_v), fastest_discharge = std::min(5.5, 0.75 / one_c_v);
+  if (log != nullptr) {
+    return draw_load_a({.load = log->load,
+                        .step_s = b.fine_s,
+                        .duration_s = 3'600 * log->hours,
+                        .capacity_ah = b.cell.capacity_ah,
+                        .start_soc = b.start_soc,
+                        .lowest_soc = 0.12,
+                        .highest_soc = full_soc,
+                        .fastest_charge = fastest_charge,
+                        .fastest_discharge = fastest_discharge},
+                       random);
+  }
+  const Profile profile = chance(random, 0.6) ? Profile::forklift_shift : Profile::drive_two_way;
+  return draw_current_a({.profile = b.setting.long_recording ? Profile::forklift_shift : profile,
+                         .step_s = b.fine_s,
+                         .capacity_ah = b.cell.capacity_ah,
+                         .start_soc = b.start_soc,
+                         .lowest_soc = 0.12,
+                         .highest_soc = full_soc,
+                         .duration_s = b.setting.long_recording ? 3'600 * between(random, 48, 80) : 28'800,
+                         .fastest_charge = fastest_charge,
+                         .fastest_discharge = fastest_discharge},
+                        random);
+}
+
+Build draw_build(std::uint64_t seed, const SlowLog* log, plant::Random& random) {
   Build b;
   b.seed = seed;
   do {
     b.cell = draw_healthy_cell(random);
   } while (b.cell.ocv_v.slope_at(full_soc) < least_slope_v);
   b.lab = draw_laboratory(b.cell.capacity_ah, false, random);
-  b.setting.cells = 8 + below(random, 17);
+  b.setting.cells = log == nullptr ? 8 + below(random, 17) : 3 + below(random, chance(random, 0.4) ? 6 : 22);
   b.setting.sensors = 2 + below(random, 5);
   b.setting.voltmeter = chance(random, 0.5);
-  b.setting.long_recording = chance(random, 0.25);
+  b.setting.long_recording = log == nullptr && chance(random, 0.25);
   b.setting.step_s = b.setting.long_recording ? 10 : 1;
   b.setting.capacity_ah = b.cell.capacity_ah;
   b.setting.r0_ohm = b.cell.r0_ohm.at(0.5);
@@ -68,18 +96,7 @@ Build draw_build(std::uint64_t seed, plant::Random& random) {
   b.start_soc = full_soc + between(random, -0.01, 0.005);
   b.fine_s = b.setting.step_s / static_cast<double>(fine_per_row);
   b.ambient_c = between(random, 23, 27);
-  const double one_c_v = b.cell.capacity_ah * (b.cell.r0_ohm.at(0.5) + b.cell.r1_ohm.at(0.5));
-  const Profile profile = chance(random, 0.6) ? Profile::forklift_shift : Profile::drive_two_way;
-  b.current_a = draw_current_a({.profile = b.setting.long_recording ? Profile::forklift_shift : profile,
-                                .step_s = b.fine_s,
-                                .capacity_ah = b.cell.capacity_ah,
-                                .start_soc = b.start_soc,
-                                .lowest_soc = 0.12,
-                                .highest_soc = full_soc,
-                                .duration_s = b.setting.long_recording ? 3'600 * between(random, 48, 80) : 28'800,
-                                .fastest_charge = std::min(2.0, 0.27 / one_c_v),
-                                .fastest_discharge = std::min(5.5, 0.75 / one_c_v)},
-                               random);
+  b.current_a = draw_profile_a(b, log, random);
   b.current_a.resize(b.current_a.size() / fine_per_row * fine_per_row);
   return b;
 }
@@ -217,12 +234,10 @@ std::vector<PackFault> measurable(const Build& b, std::vector<PackFault> faults,
   return faults;
 }
 
-}  // namespace
-
-PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only) {
+PackCase make(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only, const SlowLog* log) {
   const std::uint64_t own = derived_seed(derived_seed(seed, 0x9AC4), 2 * index + (healthy ? 1 : 0));
   plant::Random random(own);
-  const Build b = draw_build(own, random);
+  const Build b = draw_build(own, log, random);
   PackCase c;
   c.name = "pack " + std::to_string(index + 1) + (healthy ? " healthy" : "");
   c.cell = calibrate(b.cell, b.lab.calibration_share, random);
@@ -251,6 +266,42 @@ PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::str
   c.hours = c.recording.time_s.back() / 3'600;
   c.faults = measurable(b, c.faults, leaks);
   return c;
+}
+
+}  // namespace
+
+PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only) {
+  return make(seed, index, healthy, only, nullptr);
+}
+
+PackCase make_slow_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only,
+                        const SlowLog& log) {
+  PackCase c = make(seed, index, healthy, only, &log);
+  slow_down(c.recording, log.rows_s, log.samples_current);
+  return c;
+}
+
+void slow_down(PackSeries& s, double rows_s, bool samples_current) {
+  PackSeries slow = s;
+  const auto of_rows = [&](const std::vector<double>& column, bool mean) {
+    std::vector<double> values;
+    double sum = 0, count = 0, since_s = s.time_s.front();
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      sum += column[k];
+      ++count;
+      if (s.time_s[k] - since_s < rows_s && k > 0) continue;
+      values.push_back(mean ? sum / count : column[k]);
+      sum = count = 0;
+      since_s = s.time_s[k];
+    }
+    return values;
+  };
+  slow.time_s = of_rows(s.time_s, false);
+  slow.current_a = of_rows(s.current_a, !samples_current);
+  for (auto* columns : {&slow.cell_v, &slow.sensor_c})
+    for (auto& column : *columns) column = of_rows(column, false);
+  slow.pack_v = of_rows(s.pack_v, false);
+  s = std::move(slow);
 }
 
 }  // namespace bms::benchmark::truth

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "benchmark/truth/cases.hpp"
+#include "benchmark/truth/pack_loads.hpp"
 
 namespace bms::benchmark::truth {
 
@@ -44,6 +45,20 @@ struct PackCase {
 
 /// only: of a pack that is not healthy: a single fault with this id.
 PackCase make_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {});
+
+/// How a pack of 3 to 24 cells is used and logged.
+struct SlowLog {
+  PackLoad load = PackLoad::shift;
+  double rows_s = 10, hours = 8;
+  bool samples_current = false;  ///< the current of a row is that of its last second, not the mean of the row
+};
+
+/// A pack whose log has a row every rows_s.
+PackCase make_slow_pack(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only, const SlowLog& log);
+
+/// Rows of `rows_s`: voltages and temperatures of their last moment; of the current the mean or, with samples_current,
+/// that of the last moment as well.
+void slow_down(PackSeries& series, double rows_s, bool samples_current = false);
 
 /// Columns time_s, current_a, v_1 .., t_1 .., pack_voltage_v.
 std::string csv_of(const PackSeries& series);

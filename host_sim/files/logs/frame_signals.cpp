@@ -33,6 +33,7 @@ MappedSignal mapped_signal(const std::string& text, const std::vector<DbcSignal>
   mapped.target = *target;
   const auto stated = stated_scale(options.unit, *target);
   mapped.scale = stated ? *stated : scale_of(target->quantity, found->unit).value_or(Scale{});
+  if (stated) mapped.signal.unit = *stated_unit(options.unit, *target);  // of --unit, for what was read as what
   mapped.multiplexors = multiplexors_of(*found, dbc, dbc_name);
   return mapped;
 }

@@ -15,11 +15,11 @@ import numpy as _np
 from . import _core
 from ._core import (Cell, Diagnosis, Estimate, Estimator, FitFailed, Identification, InputError, Recording, Replay,
                     Simulation, __version__)
-from .exchange import from_ecm_json, to_ecm_json, to_pybamm
+from .exchange import bdf_text, from_ecm_json, to_ecm_json, to_pybamm
 
 __all__ = ["Cell", "Diagnosis", "Estimate", "Estimator", "FLAGS", "FitFailed", "Identification", "InputError",
            "Recording", "Replay", "Simulation", "diagnose", "from_ecm_json", "identify", "recording", "replay",
-           "simulate", "to_ecm_json", "to_pybamm", "__version__"]
+           "simulate", "to_bdf", "to_ecm_json", "to_pybamm", "__version__"]
 
 InputError.__doc__ = "The input cannot be used; FILE:LINE: what is wrong, what was expected, as the tool prints it."
 FitFailed.__doc__ = "The data are good, but no parameters follow from them."
@@ -48,6 +48,16 @@ def recording(source):
     if missing := [name for name in ("time_s", "current_a") if name not in present]:
         raise ValueError(f"the table has no column {missing[0]}")
     return Recording(**{name: _np.asarray(source[name], dtype=_np.float64) for name in present})
+
+
+def to_bdf(source, path=None):
+    """A recording in the Battery Data Format, as text; written to path (usually NAME.bdf.csv) if one is given.
+    Recording.load() and bms read it. source: as for recording(). Raises InputError, ValueError, OSError."""
+    text = bdf_text(recording(source))
+    if path is not None:
+        with open(path, "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+    return text
 
 
 def _recordings(sources):

@@ -14,6 +14,17 @@ _THERMAL = {"Cell thermal mass [J/K]": 1000.0, "Cell-jig heat transfer coefficie
             "Jig thermal mass [J/K]": 500.0, "Jig-air heat transfer coefficient [W/K]": 10.0}
 
 
+_BDF = {"time_s": "Test Time / s", "voltage_v": "Voltage / V", "current_a": "Current / A",
+        "temperature_c": "Surface Temperature T1 / degC"}
+
+
+def bdf_text(recording):
+    """The columns that the recording has, under the labels of the Battery Data Format. A missing reading is empty."""
+    columns = {label: getattr(recording, name) for name, label in _BDF.items() if len(getattr(recording, name))}
+    rows = zip(*(["" if np.isnan(value) else repr(float(value)) for value in of] for of in columns.values()))
+    return "\n".join([",".join(columns), *(",".join(row) for row in rows)]) + "\n"
+
+
 def _ends(soc, values):
     """With values at 0 and 1: outside its nodes an RC table is constant."""
     return np.concatenate(([0.0], soc, [1.0])), np.concatenate((values[:1], values, values[-1:]))

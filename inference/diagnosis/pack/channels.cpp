@@ -82,14 +82,14 @@ ChannelState frozen_rows(const std::vector<double>& v, const Track& track, const
   return s;
 }
 
-/// Squared difference of changes: readings against the model `lag` rows before, with the best factor.
-double error_at_lag(const std::vector<double>& v, const std::vector<double>& model, std::ptrdiff_t lag) {
+/// Squared difference of changes: readings against those of the median cell `lag` rows before, with the best factor.
+double error_at_lag(const std::vector<double>& v, const std::vector<double>& median_v, std::ptrdiff_t lag) {
   double vv = 0, vm = 0, mm = 0;
   const auto rows = static_cast<std::ptrdiff_t>(v.size());
   for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, 1 + lag); k < std::min(rows, rows + lag); ++k) {
     const auto at = static_cast<std::size_t>(k), from = static_cast<std::size_t>(k - lag);
-    const double dv = v[at] - v[at - 1], dm = model[from] - model[from - 1];
-    if (!std::isfinite(dv)) continue;
+    const double dv = v[at] - v[at - 1], dm = median_v[from] - median_v[from - 1];
+    if (!std::isfinite(dv + dm)) continue;
     vv += dv * dv;
     vm += dv * dm;
     mm += dm * dm;
@@ -97,15 +97,16 @@ double error_at_lag(const std::vector<double>& v, const std::vector<double>& mod
   return mm > 0 && vv > 0 ? 1 - vm * std::max(vm, 0.0) / (vv * mm) : 1;
 }
 
-/// Lag of the readings behind the model, in whole rows.
-double best_lag(const std::vector<double>& v, const Track& track, double step_s) {
+/// Lag of the readings behind those of the median cell, in whole rows. Not behind the current: what it did within a row
+/// is unknown, and a load with a period of its own is alike at several lags.
+double best_lag(const std::vector<double>& v, const std::vector<double>& median_v, double step_s) {
   const auto rows_of = [&](double s) { return static_cast<std::ptrdiff_t>(s / step_s); };
-  const double now = error_at_lag(v, track.model_v, 0);
+  const double now = error_at_lag(v, median_v, 0);
   double best = now;
   std::ptrdiff_t found = 0;
   const double last_s = std::max(of_channels.lag_to_s, of_channels.lag_rows * step_s);
   for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(last_s); ++lag) {
-    const double error = error_at_lag(v, track.model_v, lag);
+    const double error = error_at_lag(v, median_v, lag);
     if (error >= best) continue;
     best = error;
     found = lag;
@@ -212,7 +213,7 @@ Channels check_channels(const Track& track, PackRecording& pack) {
       s.held_s = time_between_changes(v, track, pack, most_v);
       keep_fresh_readings(v);
     } else {
-      s.lag_s = best_lag(v, track, track.step_s);
+      s.lag_s = best_lag(v, median_v, track.step_s);
     }
     s.glitches = glitches;
     channels.cells.push_back(s);

@@ -8,6 +8,7 @@
 #include <Eigen/Cholesky>
 
 #include "diagnosis/pack/cell_fit.hpp"
+#include "diagnosis/pack/current_kind.hpp"
 #include "diagnosis/pack/isolability.hpp"
 #include "diagnosis/pack/loose_wires.hpp"
 #include "diagnosis/pack/pack_likelihood.hpp"
@@ -60,10 +61,10 @@ Vector prior_of(const State& s, std::size_t cell, bool anything) {
   Vector prior = s.healthy;
   for (Eigen::Index p = 0; anything && p < prior.size(); ++p) prior[p] = std::hypot(s.healthy[p], fault[p]);
   for (const Cause cause : {Cause::resistance, Cause::capacity, Cause::late}) {
-    if (anything) widen_for(cause, s.healthy, s.track.r0_ohm, prior);
+    if (anything) widen_for(cause, s.healthy, s.track.r0_ohm, s.track.unseen_share, prior);
   }
   for (const Accusation& a : s.accused) {
-    if (a.touches(cell)) widen_for(a.cause, s.healthy, s.track.r0_ohm, prior);
+    if (a.touches(cell)) widen_for(a.cause, s.healthy, s.track.r0_ohm, s.track.unseen_share, prior);
   }
   return prior;
 }
@@ -81,7 +82,7 @@ NoiseModel starting_noise() {
 }
 
 PackLikelihood likelihood_of(const State& s) {
-  return {s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s};
+  return {s.fits, s.healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s, s.track.unseen_share};
 }
 
 void fit_all(State& s, bool anything, double from, double to) {
@@ -269,8 +270,9 @@ Estimated size_of(const State& s, const PackLikelihood& likelihood, const Accusa
   const double beyond = std::max(0.0, std::abs(value) - limits.healthy_sigmas * s.healthy[p]);
   Vector healthy = s.healthy;
   healthy[p] *= limits.negligible;
-  const Estimated size = PackLikelihood(s.fits, healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s)
-                             .size(s.accused, a, likelihood.last_checkpoint());
+  const Estimated size =
+      PackLikelihood(s.fits, healthy, s.track.r0_ohm, s.track.days.back(), s.track.step_s, s.track.unseen_share)
+          .size(s.accused, a, likelihood.last_checkpoint());
   return {size.value, std::hypot(size.sigma, to_named * s.healthy[p], to_named * beyond)};
 }
 
@@ -348,6 +350,7 @@ std::size_t typical_cell(const State& s) {
 }  // namespace
 
 PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& pack, const PackOptions& options) {
+  find_current_kind(pack, cell.capacity_ah);
   State s{.options = options,
           .pack = pack,
           .track = track_of(cell, pack),
@@ -382,8 +385,10 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
   std::vector<std::size_t> explained;
   for (const Accusation& a : s.accused) explained.push_back(a.cell);
   d.unexplained = unexplained_cells(pack, s.fits, explained, d.noise_v);
+  d.is_finite = std::all_of(s.fits.begin(), s.fits.end(),
+                            [](const CellFit& fit) { return std::isfinite(fit.cost) && fit.theta.allFinite(); });
   const Matrix& information = s.fits[typical_cell(s)].all().of_parameters;
-  d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm);
+  d.isolability = isolability_of(information, s.healthy, s.track.r0_ohm, s.track.unseen_share);
   d.detection_limits = detection_limits_of(information, s.healthy, s.track.r0_ohm, likelihood);
   d.not_visible = without_limit(d.detection_limits);
   d.reference = reference_of(s);

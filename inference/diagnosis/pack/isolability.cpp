@@ -32,11 +32,12 @@ constexpr std::array added_sensors = {
 struct Data {
   Eigen::MatrixXd information;
   Eigen::VectorXd healthy;
+  double unseen_share = 0;  ///< as in Track
 };
 
 /// Two cells with the channels that they have, and with another instrument on the first one.
-Data data_of(const Matrix& information, const Vector& healthy, const Sensor* added) {
-  Data d{Eigen::MatrixXd::Zero(pair_width, pair_width), Eigen::VectorXd::Zero(pair_width)};
+Data data_of(const Matrix& information, const Vector& healthy, double unseen_share, const Sensor* added) {
+  Data d{Eigen::MatrixXd::Zero(pair_width, pair_width), Eigen::VectorXd::Zero(pair_width), unseen_share};
   for (Eigen::Index cell = 0; cell < 2; ++cell) {
     Eigen::MatrixXd into = Eigen::MatrixXd::Zero(width, pair_width);
     into.middleCols(cell * width, width).setIdentity();
@@ -66,7 +67,7 @@ Eigen::VectorXd prior_for(const Data& d, Cause cause, double r0_ohm) {
   if (cause == Cause::sense_wire)
     prior[place_of(cause)] = std::hypot(prior[place_of(cause)], limits.spread[offset].fault);
   else
-    widen_for(cause, d.healthy.head(width), r0_ohm, prior.head(width));
+    widen_for(cause, d.healthy.head(width), r0_ohm, d.unseen_share, prior.head(width));
   return prior;
 }
 
@@ -140,13 +141,13 @@ double largest_size(Cause cause, double r0_ohm) {
 
 }  // namespace
 
-Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm) {
+Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm, double unseen_share) {
   Isolability result;
   result.causes.assign(cell_causes.begin(), cell_causes.end());
-  result.separable = separable(data_of(information, healthy, nullptr), r0_ohm);
+  result.separable = separable(data_of(information, healthy, unseen_share, nullptr), r0_ohm);
   const std::size_t now = pairs_in(result.separable);
   for (const Sensor& sensor : added_sensors) {
-    const std::size_t then = pairs_in(separable(data_of(information, healthy, &sensor), r0_ohm));
+    const std::size_t then = pairs_in(separable(data_of(information, healthy, unseen_share, &sensor), r0_ohm));
     result.added.push_back({sensor.name, then > now ? then - now : 0});
   }
   std::stable_sort(result.added.begin(), result.added.end(),
@@ -156,7 +157,7 @@ Isolability isolability_of(const Matrix& information, const Vector& healthy, dou
 
 std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vector& healthy, double r0_ohm,
                                            const PackLikelihood& likelihood) {
-  const Data d = data_of(information, healthy, nullptr);
+  const Data d = data_of(information, healthy, likelihood.unseen_share(), nullptr);
   std::vector<PackLimit> list;
   for (const Cause cause : cell_causes) {
     const double least = likelihood.least()[static_cast<Eigen::Index>(parameter_of(cause))];

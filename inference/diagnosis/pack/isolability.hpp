@@ -10,8 +10,9 @@
 
 namespace bms::diagnosis::pack {
 
-/// information: of a typical healthy cell, with all rows. The data of a fault are what the model gives without noise.
-Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm);
+/// information: of a typical healthy cell, with all rows. unseen_share: as in Track. The data of a fault are what the
+/// model gives without noise.
+Isolability isolability_of(const Matrix& information, const Vector& healthy, double r0_ohm, double unseen_share);
 
 /// The sizes at which a cause that is alone in this cell would be named: by its gain, its significance, and the size
 /// that is worth a visit. A size that no cell, connection or channel can have is left out. likelihood: of this pack.

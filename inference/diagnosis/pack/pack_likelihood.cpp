@@ -58,7 +58,8 @@ double log_marginal(const Eigen::MatrixXd& information, const Eigen::VectorXd& w
   return (scaled.dot(factor.solve(scaled)) - log_determinant) / 2;
 }
 
-void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eigen::VectorXd> prior) {
+void widen_for(Cause cause, const Vector& healthy, double r0_ohm, double unseen_share,
+               Eigen::Ref<Eigen::VectorXd> prior) {
   const auto p = static_cast<Eigen::Index>(parameter_of(cause));
   prior[p] = std::hypot(healthy[p], fault_spread(r0_ohm)[p]);
   const bool moved = cause == Cause::imbalance || cause == Cause::capacity || cause == Cause::leakage;
@@ -68,11 +69,17 @@ void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eig
     if (moved) prior[k] = std::hypot(prior[k], spread.moved);
     if (cause == Cause::late) prior[k] = std::hypot(prior[k], spread.late);
   }
+  if (cause == Cause::resistance || cause == Cause::joint)
+    prior[blur] = std::hypot(prior[blur], unseen_share * limits.spread[joint].fault);
 }
 
 PackLikelihood::PackLikelihood(const std::vector<CellFit>& fits, const Vector& healthy, double r0_ohm, double days,
-                               double step_s)
-    : fits_(fits), r0_ohm_(r0_ohm), healthy_(healthy), least_(from_limits(r0_ohm, &Spread::least)) {
+                               double step_s, double unseen_share)
+    : fits_(fits),
+      r0_ohm_(r0_ohm),
+      unseen_share_(unseen_share),
+      healthy_(healthy),
+      least_(from_limits(r0_ohm, &Spread::least)) {
   least_[delay] = std::max(least_[delay], limits.channels.least_rows_late * step_s);
   // a leak must have moved the charge by what is worth a visit
   least_[leak] = std::max(least_[leak], least_[charge] / std::max(days, std::numeric_limits<double>::epsilon()));
@@ -105,7 +112,7 @@ PackLikelihood::System PackLikelihood::system_of(const std::vector<Accusation>& 
     s.prior.segment(at, width) = healthy_;
     for (const Accusation& a : accusations) {
       if (a.cause == Cause::sense_wire || a.cell != cells[k]) continue;
-      widen_for(a.cause, healthy_, r0_ohm_, s.prior.segment(at, width));
+      widen_for(a.cause, healthy_, r0_ohm_, unseen_share_, s.prior.segment(at, width));
     }
   }
   s.prior.tail(static_cast<Eigen::Index>(wires.size())).setConstant(limits.spread[offset].fault);

@@ -33,8 +33,9 @@ struct Estimated {
 class PackLikelihood {
  public:
   /// healthy: standard deviation of each parameter over the healthy cells. r0_ohm: of a cell.
-  /// days: length of the recording. step_s: between rows.
-  PackLikelihood(const std::vector<CellFit>& fits, const Vector& healthy, double r0_ohm, double days, double step_s);
+  /// days: length of the recording. step_s: between rows. unseen_share: as in Track.
+  PackLikelihood(const std::vector<CellFit>& fits, const Vector& healthy, double r0_ohm, double days, double step_s,
+                 double unseen_share = 0);
 
   /// ln Z of all cells that the accusations touch. checkpoint: with the rows up to it.
   double of(const std::vector<Accusation>& accusations, const std::vector<std::size_t>& cells,
@@ -53,6 +54,7 @@ class PackLikelihood {
   /// Posterior odds [ln] above which an accusation is named, in terms of the gain.
   double least_gain() const;
   const Vector& healthy() const { return healthy_; }
+  double unseen_share() const { return unseen_share_; }
   /// A smaller size is never named: by parameter, for this recording's rows and length.
   const Vector& least() const { return least_; }
   /// Returns true if a fault can have this size: large enough, significant, of the possible sign.
@@ -68,7 +70,7 @@ class PackLikelihood {
   std::vector<std::size_t> cells_of(const std::vector<Accusation>& accusations, const Accusation& around) const;
 
   const std::vector<CellFit>& fits_;
-  double r0_ohm_;
+  double r0_ohm_, unseen_share_;
   Vector healthy_, least_;
 };
 
@@ -80,8 +82,10 @@ Vector least_spread(double r0_ohm);
 /// Spread of faulty cells.
 Vector fault_spread(double r0_ohm);
 
-/// Widens the prior of a cell's parameters, standard deviations, for this cause in the cell.
-void widen_for(Cause cause, const Vector& healthy, double r0_ohm, Eigen::Ref<Eigen::VectorXd> prior);
+/// Widens the prior of a cell's parameters, standard deviations, for this cause in the cell. A resistance responds to
+/// the current within a row, of which the share that is not seen has an error that grows with it.
+void widen_for(Cause cause, const Vector& healthy, double r0_ohm, double unseen_share,
+               Eigen::Ref<Eigen::VectorXd> prior);
 
 /// ln Z for any information, data and prior.
 double log_marginal(const Eigen::MatrixXd& information, const Eigen::VectorXd& with_data, const Eigen::VectorXd& prior);

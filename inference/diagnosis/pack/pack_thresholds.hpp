@@ -46,6 +46,12 @@ struct PackThresholds {
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
   }};
+  /// Of the voltage's changes from row to row, that those of the current explain: of means it is at most 0.4.
+  double single_readings = 0.7;
+  /// A step at any moment of a row: variance of its mean over the square of the step. A current that is another one in
+  /// each row: the same over the square of its changes.
+  double step_in_row = 1.0 / 12, new_in_row = 0.5;
+  double seconds_per_hour = 3'600;
   double most_spread = 12;                          ///< of the spread that a pack may show, over that of healthy cells
   double outlying_share = 0.2, outlying_cells = 4;  ///< so many cells of a pack may be faulty in one parameter
   double widest_quantile = 4, quantile_accuracy = 1e-4;  ///< of the search for a quantile of the normal distribution
@@ -165,7 +171,8 @@ struct PackThresholds {
     double start_soc = 0.05;                                 ///< standard deviation of the start
     double healthy_offset_c = 0.0012, healthy_gain = 0.004;  ///< of a current sensor
     double healthy_capacity = 0.01;                          ///< of all cells, against the cell file
-    double resistance = 1, polarisation = 1, per_k = 0.03, resistance_wave = 0.03;
+    /// polarisation: of R1 next to R0. Slow rows show only their sum, and a cell of any age has the file's ratio about.
+    double resistance = 1, polarisation = 0.3, per_k = 0.03, resistance_wave = 0.03;
     /// The cells may be others than that of the file: errors of its OCV, over its tolerance, all as probable.
     std::array<double, 5> ocv_factors = {1, 2, 4, 8, 16};
     double another_cell = 3;    ///< RMS of these errors over the tolerance, from which on the file is of another cell

@@ -66,6 +66,7 @@ struct PackDiagnosis {
   std::vector<PackLimit> detection_limits;
   std::vector<Cause> not_visible;      ///< causes that no possible size would show in this recording
   std::vector<std::size_t> reference;  ///< cells that served as the neighbours
+  bool is_finite = true;               ///< false: numbers of a cell's comparison are not, and there is no answer
   bool another_cell = false;           ///< the OCV of the file is not that of these cells
   double noise_v = 0;                  ///< RMS of the difference between healthy cells, what the model does not explain
   double duration_s = 0;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "diagnosis/pack/current_kind.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 
 namespace bms::diagnosis::pack {
@@ -64,7 +65,7 @@ std::vector<double> counted_charge(const Track& track, const PackRecording& pack
   std::vector<double> charge(pack.rows(), 0.0);
   for (std::size_t k = 1; k < charge.size(); ++k) {
     const double dt_s = pack.time_s[k] - pack.time_s[k - 1];
-    const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
+    const double mean_a = mean_current_a(pack, k), current_a = std::isfinite(mean_a) ? mean_a : 0;
     charge[k] = charge[k - 1] + current_a * dt_s / (3'600 * track.capacity_ah);
   }
   return charge;

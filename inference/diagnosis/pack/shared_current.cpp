@@ -9,6 +9,7 @@
 #include <Eigen/Cholesky>
 
 #include "diagnosis/noise.hpp"
+#include "diagnosis/pack/current_kind.hpp"
 #include "diagnosis/pack/damped_fit.hpp"
 #include "diagnosis/pack/noise_search.hpp"
 #include "diagnosis/pack/pack_likelihood.hpp"
@@ -46,12 +47,12 @@ struct Problem {
   Unknowns healthy = Unknowns::Zero();
 };
 
-double or_zero(double value) { return std::isfinite(value) ? value : 0; }
-
-Unknowns healthy_of(const Track& t, double ocv_factor) {
+Unknowns healthy_of(const Problem& p, double ocv_factor) {
+  const Track& t = p.track;
+  const double hours = limits.hours_per_day * t.days.back(), walk_c = p.pack.count_walk / std::sqrt(hours);
   Unknowns u = Unknowns::Constant(ocv_factor * t.ocv_tolerance_v / std::numbers::sqrt2);
   u[start] = of_shared.start_soc;
-  u[sensor_offset] = of_shared.healthy_offset_c * t.capacity_ah;
+  u[sensor_offset] = std::hypot(of_shared.healthy_offset_c, walk_c) * t.capacity_ah;  // a walk looks like one
   u[sensor_gain] = of_shared.healthy_gain;
   u[all_capacity] = of_shared.healthy_capacity;
   u[all_resistance] = of_shared.resistance;
@@ -70,17 +71,15 @@ struct Course {
 
 Course course_of(const Problem& p, const Unknowns& u) {
   Course c;
-  const std::size_t rows = p.pack.rows();
-  c.soc.reserve(rows);
-  c.v_rc_v.reserve(rows);
   double v_rc_v = 0;
   std::uint8_t interval = 0;
-  for (std::size_t k = 0; k < rows; ++k) {
+  for (std::size_t k = 0; k < p.pack.rows(); ++k) {
     const double lasted_s = p.pack.time_s[k] - p.pack.time_s.front();
     const double lost = u[sensor_offset] * lasted_s / (3'600 * p.track.capacity_ah);
     c.soc.push_back(p.track.soc.front() + u[start] +
                     (1 + u[all_capacity]) * ((1 - u[sensor_gain]) * p.charge[k] - lost));
-    const double current_a = (1 - u[sensor_gain]) * or_zero(p.pack.current_a[k]) - u[sensor_offset];
+    const double mean_a = mean_current_a(p.pack, k);
+    const double current_a = (1 - u[sensor_gain]) * (std::isfinite(mean_a) ? mean_a : 0) - u[sensor_offset];
     const double dt_s = k > 0 ? p.pack.time_s[k] - p.pack.time_s[k - 1] : 0;
     const auto at = model::look_up(p.track.cell, c.soc[k], interval);
     v_rc_v += -std::expm1(-dt_s / (at.r1_ohm * at.c1_f)) * (at.r1_ohm * current_a - v_rc_v);
@@ -135,6 +134,7 @@ void set_row(const Problem& p, const Unknowns& u, std::size_t block, double soc,
 Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const NoiseModel& noise) {
   const std::size_t blocks = p.blocks.count();
   const Course course = course_of(p, u);
+  const double walk2 = of_shared.soc_walk * of_shared.soc_walk + p.pack.count_walk * p.pack.count_walk;
   const std::vector<double> soc = p.blocks.means(course.soc), v_rc_v = p.blocks.means(course.v_rc_v);
   Around a;
   a.u = u;
@@ -144,8 +144,8 @@ Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const 
   for (std::size_t k = 0; k < blocks; ++k) {
     set_row(p, u, k, soc[k], v_rc_v[k], columns);
     const double hours = (p.blocks.time_s[k] - p.pack.time_s.front()) / 3'600;
-    const double axis2 = of_shared.soc_axis * of_shared.soc_axis + of_shared.soc_walk * of_shared.soc_walk * hours;
-    const double slope_v = columns(static_cast<Eigen::Index>(k), start);
+    const double axis2 = of_shared.soc_axis * of_shared.soc_axis + walk2 * hours,
+                 slope_v = columns(static_cast<Eigen::Index>(k), start);
     a.rows.slow_v2[k] = axis2 * slope_v * slope_v;
     a.residual_v.push_back(columns(static_cast<Eigen::Index>(k), unknowns));
   }
@@ -230,7 +230,7 @@ Around best_fit(Problem& p) {
   const Unknowns coarse = starting_point(p);
   for (std::size_t n = 0; n < of_shared.ocv_factors.size(); n += 2) {
     const double factor = of_shared.ocv_factors[n];
-    Unknowns wide = healthy_of(p.track, factor);
+    Unknowns wide = healthy_of(p, factor);
     wide[sensor_offset] = of_shared.fault_offset_c * p.track.capacity_ah;
     const NoiseModel noise{.white_v = of_shared.white_v, .fast_v = of_shared.fast_v, .slow_v = of_shared.slow_v};
     for (const Unknowns& from : {Unknowns(Unknowns::Zero()), coarse}) {
@@ -245,7 +245,7 @@ Around best_fit(Problem& p) {
       best_factor = factor;
     }
   }
-  p.healthy = healthy_of(p.track, best_factor);
+  p.healthy = healthy_of(p, best_factor);
   return best;
 }
 
@@ -282,10 +282,10 @@ struct Hypothesis {
 };
 
 /// Log probability of the data if this unknown has a fault of that size: the mean over how wrong the file's OCV is.
-double evidence_of(const Around& a, const Track& t, Eigen::Index unknown, double fault) {
+double evidence_of(const Around& a, const Problem& p, Eigen::Index unknown, double fault) {
   std::vector<double> logs;
   for (const double factor : of_shared.ocv_factors) {
-    Unknowns prior = healthy_of(t, factor);
+    Unknowns prior = healthy_of(p, factor);
     prior[unknown] = std::hypot(prior[unknown], fault);
     logs.push_back(log_marginal(a.information, a.with_data, prior));
   }
@@ -295,8 +295,8 @@ double evidence_of(const Around& a, const Track& t, Eigen::Index unknown, double
   return most + std::log(sum / static_cast<double>(logs.size()));
 }
 
-double gain_of(const Around& a, const Track& t, Eigen::Index unknown, double fault) {
-  return evidence_of(a, t, unknown, fault) - evidence_of(a, t, unknown, 0);
+double gain_of(const Around& a, const Problem& p, Eigen::Index unknown, double fault) {
+  return evidence_of(a, p, unknown, fault) - evidence_of(a, p, unknown, 0);
 }
 
 PackFinding finding_for(const Around& a, const Unknowns& healthy, const Hypothesis& h) {
@@ -320,7 +320,7 @@ std::optional<PackFinding> judge(const Problem& p, const Around& a) {
       {sensor_gain, Cause::current_gain, of_shared.fault_gain, of_shared.least_gain, 0},
       {all_capacity, Cause::all_capacity, of_shared.fault_capacity, of_shared.least_capacity, 0},
   }};
-  for (Hypothesis& h : list) h.gain = gain_of(a, p.track, h.unknown, h.fault);
+  for (Hypothesis& h : list) h.gain = gain_of(a, p, h.unknown, h.fault);
   std::stable_sort(list.begin(), list.end(), [](const auto& x, const auto& y) { return x.gain > y.gain; });
   const Hypothesis& best = list.front();
   const double needed = std::log(static_cast<double>(list.size()) / limits.fault_prior) + limits.least_odds;

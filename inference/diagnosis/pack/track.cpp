@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "diagnosis/pack/current_kind.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 #include "diagnosis/pack/shared_blocks.hpp"
 #include "measurement/statistics.hpp"
@@ -63,7 +64,7 @@ void set_instant(Track& track, const PackRecording& pack) {
     const double step_s = pack.time_s[k] - last_s;
     last_s = pack.time_s[k];
     const double next_a = k + 1 < pack.rows() ? pack.current_a[k + 1] : pack.current_a[k];
-    // where the current is constant the measured one is better
+    // where the current is constant the measured one is better; a single reading is seldom of the neighbours' moment
     if (std::abs(next_a - pack.current_a[k]) > limits.noise.quiet_c * track.capacity_ah)
       track.instant_a[k] += (apart_v - slow_v) / track.r0_by_row_ohm[k];
     slow_v += -std::expm1(-std::max(step_s, 0.0) / (limits.instant_rows * track.step_s)) * (apart_v - slow_v);
@@ -83,7 +84,7 @@ RcVoltage rc_voltage_of(const Track& track, const PackRecording& pack, double ln
   const double factor = std::exp(ln_factor);
   double v = 0, by_tau_v = 0, last_s = pack.time_s.front();
   for (std::size_t k = 0; k < pack.rows(); ++k) {
-    const double current_a = std::isfinite(pack.current_a[k]) ? pack.current_a[k] : 0;
+    const double mean_a = mean_current_a(pack, k), current_a = std::isfinite(mean_a) ? mean_a : 0;
     const double share = (pack.time_s[k] - last_s) / (factor * track.tau_s[k]);
     last_s = pack.time_s[k];
     const double missing_v = track.r1_by_row_ohm[k] * current_a - v, passed = -std::expm1(-share);
@@ -118,6 +119,8 @@ Track track_of(const model::CellParameters<>& cell, const PackRecording& pack, c
     t.days.push_back((pack.time_s[k] - pack.time_s.front()) / (limits.hours_per_day * 3600));
   }
   t.v_rc_v = rc_voltage_of(t, pack, 0).v;
+  const auto half = model::look_up(t.cell, 0.5);
+  t.unseen_share = -std::expm1(-t.step_s / (half.r1_ohm * half.c1_f)) * half.r1_ohm / half.r0_ohm;
   t.warm_k = warmer_than_at_start(pack);
   for (double& k : t.warm_k) k = std::max(0.0, k);
   for (std::size_t k = 0; k < pack.rows(); ++k) t.model_v[k] += t.v_rc_v[k];

@@ -17,7 +17,10 @@ struct Track {
   double r0_ohm = 0;           ///< at half charge
   double ocv_tolerance_v = 0;  ///< of the cell file
   double capacity_ah = 0;
-  double step_s = 1;                         ///< usual time between rows
+  double step_s = 1;  ///< usual time between rows
+  /// Of a step of the current within a row: what shows in the polarisation over what shows at once, as the end of the
+  /// row does not distinguish them.
+  double unseen_share = 0;
   std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
   bool is_calibrated = false;                ///< the resistances follow from this pack
   std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file

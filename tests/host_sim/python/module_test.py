@@ -234,6 +234,21 @@ class Errors(unittest.TestCase):
 
 
 class Exchange(unittest.TestCase):
+    def test_bdf_is_read_again_to_the_last_bit(self):
+        volts, missing = 3.3 + np.random.default_rng(1).normal(0, 0.1, 40), 7
+        volts[missing] = np.nan
+        table = {"time_s": np.arange(40.0), "current_a": np.linspace(-5, 5, 40) / 3, "voltage_v": volts,
+                 "temperature_c": np.full(40, 21.5)}
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, "a.bdf.csv")
+            text = gb.to_bdf(table, path)
+            again = gb.Recording.load(path)
+        self.assertEqual(text.splitlines()[0],
+                         "Test Time / s,Voltage / V,Current / A,Surface Temperature T1 / degC")
+        self.assertIn("Battery Data Format", again.read_as)
+        for name, column in table.items():
+            np.testing.assert_array_equal(getattr(again, name), column)
+
     def parameters(self, cell):
         return gb.to_pybamm(cell, interpolant=lambda x, y, variable, name: float(np.interp(variable, x, y)))
 
@@ -322,21 +337,28 @@ class Documentation(unittest.TestCase):
                 if not name.startswith("_"):
                     self.assertTrue(getattr(thing, name).__doc__, (thing, name))
 
-    def test_the_page_is_right(self):
-        text = (SOURCE / "docs/python.md").read_text()
+    def run_page(self, name):
+        """Every line of the page, in its order, in an empty folder."""
+        text = (SOURCE / name).read_text()
         code = "\n".join(re.findall(r"^```python\n(.*?)^```", text, re.S | re.M))
         with tempfile.TemporaryDirectory() as folder:
             before = os.getcwd()
             os.symlink(SOURCE / "evidence", os.path.join(folder, "evidence"))
             os.chdir(folder)
             try:
-                page = doctest.DocTestParser().get_doctest(code, {}, "docs/python.md", None, 0)
+                page = doctest.DocTestParser().get_doctest(code, {}, name, None, 0)
                 self.assertGreater(len(page.examples), 15)
                 found = []
                 doctest.DocTestRunner(optionflags=doctest.ELLIPSIS).run(page, out=found.append)
             finally:
                 os.chdir(before)
         self.assertFalse(found, "".join(found))
+
+    def test_the_page_is_right(self):
+        self.run_page("docs/python.md")
+
+    def test_the_page_for_users_of_other_tools_is_right(self):
+        self.run_page("docs/from_pybamm.md")
 
 
 class Speed(unittest.TestCase):

@@ -1,0 +1,17 @@
+// What the current of a row is: the mean since the row before, as a counter gives it, or a single reading, as most
+// monitors log it. A count of single readings is wrong by what the current did in between.
+#pragma once
+
+#include "diagnosis/pack/pack_recording.hpp"
+
+namespace bms::diagnosis::pack {
+
+/// Sets single_readings and count_walk. A load that does not wait for the log changes within its rows. A mean then
+/// differs from the current at the moment of the voltages by at least half of what it differs from the mean before, in
+/// squares; a reading does not.
+void find_current_kind(PackRecording& pack, double capacity_ah);
+
+/// Mean current over the interval that ends with row k, as far as it is known; NaN: unknown.
+double mean_current_a(const PackRecording& pack, std::size_t k);
+
+}  // namespace bms::diagnosis::pack
