@@ -295,6 +295,27 @@ TEST(CurrentReferee, NamesTheSensorThatDoesNotFollowTheVoltages) {
   EXPECT_EQ(CurrentReferee().verdict(), Inputs::wrong_current_sensor_not_known) << "no current has flowed";
 }
 
+TEST(CurrentReferee, IsPublishedWithoutInputsFromTheFirstWrongSensorOn) {
+  TruckDay t;
+  host_hal::second_current_sensor = true;
+  host_hal::second_current_reading_ua = 0;
+  t.run(3);
+  EXPECT_FALSE(last<Inputs>()) << "a board without inputs, and no sensor is wrong";
+  host_hal::second_current_reading_ua = 200'000'000;
+  t.run(4);
+  ASSERT_TRUE(last<Inputs>());
+  EXPECT_EQ(last<Inputs>()->wrong_current_sensor, Inputs::wrong_current_sensor_not_known) << "no current has flowed";
+  host_hal::second_current_reading_ua = 0;
+  t.run(12);
+  can::Command clear;
+  clear.code = can::Command::code_clear_faults;
+  clear.argument = 1;
+  t.send(clear.frame(13));
+  t.run(3);
+  EXPECT_EQ(t.faults(), 0U);
+  EXPECT_EQ(last<Inputs>()->wrong_current_sensor, Inputs::wrong_current_sensor_none);
+}
+
 TEST(TruckOutputs, HeatOnlyAtACharger) {
   TruckOutputs outputs;
   const protection::ProtectionPlan& plan = TruckBoard::plan();
