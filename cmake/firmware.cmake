@@ -73,6 +73,10 @@ if(BMS_SECOND_CURRENT STREQUAL "absent")
 endif()
 list(REMOVE_ITEM BMS_INPUTS none)
 list(REMOVE_ITEM BMS_OUTPUTS none)
+set(may_stop false)
+if(BMS_SAMPLES STREQUAL "bq76952")
+  set(may_stop true)
+endif()
 set(truck_side false)
 if(BMS_INPUTS OR second_current_possible OR NOT BMS_INSULATION STREQUAL "absent")
   set(truck_side true)
@@ -256,14 +260,14 @@ set(can_bxcan ${chip}/bxcan.cpp)
 set(no_chain ${absent_hal}/calibration.cpp ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp
   ${absent_hal}/second_current.cpp ${no_truck})  # for a board without a measuring chain
 set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${no_chain})
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${no_chain})
+set(samples_remote ${hal}/remote/samples.cpp ${absent_hal}/sleep.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
   ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_truck})
 # The settings of the chip's own protections follow the cell file.
 set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
   ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
-  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts}
-  ${second_current} ${truck_pins} ${insulation})
+  ${chip}/i2c.cpp ${chip}/sleep.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp
+  ${auxiliary_contacts} ${second_current} ${truck_pins} ${insulation})
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
@@ -306,7 +310,8 @@ bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cel
   ${generated_headers})
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
 foreach(objects application estimator_step)
-  target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_BOARD="${BMS_BOARD}")
+  target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_MAY_STOP=${may_stop}
+    BMS_BOARD="${BMS_BOARD}")
 endforeach()
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
   OUTPUT_FORMAT HEXADECIMAL)

@@ -114,6 +114,11 @@ class Application {
     serve_update<Board>(
         pack, inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
         !board_.state.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
+    if constexpr (requires { requires Board::may_stop; }) {
+      if (!truck_.park(pack, inputs, charger, protection_.decision(), board_, Board::plan())) return;
+      shut_down();
+      hal::switch_off();
+    }
   }
 
   /// Stores the state when the battery is switched off. The last call.

@@ -316,6 +316,24 @@ TEST(CurrentReferee, IsPublishedWithoutInputsFromTheFirstWrongSensorOn) {
   EXPECT_EQ(last<Inputs>()->wrong_current_sensor, Inputs::wrong_current_sensor_none);
 }
 
+TEST(Shelf, WaitsForAMinuteOfRest) {
+  constexpr std::int32_t empty_uv = 2'908'000;
+  Shelf shelf;
+  std::uint64_t us = 0;
+  const auto after = [&](int seconds, std::int32_t uv, bool unused = true) {
+    bool off = false;
+    for (int k = 0; k < 10 * seconds; ++k) off = shelf.update(uv, empty_uv, unused, us += 100'000) || off;
+    return off;
+  };
+  EXPECT_FALSE(after(3'600, empty_uv));
+  EXPECT_FALSE(after(59, empty_uv - 1));
+  EXPECT_FALSE(after(1, empty_uv)) << "one sample above begins the minute again";
+  EXPECT_FALSE(after(59, empty_uv - 1));
+  EXPECT_FALSE(after(3'600, empty_uv - 1, false)) << "while it is used";
+  EXPECT_FALSE(after(3'600, measurement::no_reading));
+  EXPECT_TRUE(after(61, empty_uv - 1));
+}
+
 TEST(TruckOutputs, HeatOnlyAtACharger) {
   TruckOutputs outputs;
   const protection::ProtectionPlan& plan = TruckBoard::plan();
