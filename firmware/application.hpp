@@ -328,6 +328,7 @@ class Application {
 
   template <class May>
   [[gnu::noinline]] std::uint32_t handle_parameters(const can::Command& command, May&& may) {
+    if (const auto result = truck_.command(command, protection_.decision().outputs.any_closed(), may)) return *result;
     auto& block = Board::parameters();
     const std::uint16_t before = block.revision();
     const std::uint32_t result =

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 
+#include "firmware/commands.hpp"
 #include "firmware/current_referee.hpp"
 #include "firmware/hardware_inputs.hpp"
 #include "firmware/insulation_monitor.hpp"
@@ -58,6 +60,18 @@ class TruckSide {
     }
   }
 
+  /// Returns the result of a command that is for the truck, if it is.
+  template <class May>
+  std::optional<std::uint32_t> command(const can::Command& command, bool closed, May&& may) {
+    using A = can::CommandAnswer;
+    if (command.code != can::Command::code_switch_off) return std::nullopt;
+    if (command.argument != 0) return A::result_refused;
+    if (!may(Privilege::service)) return A::result_not_authorised;
+    if (closed) return A::result_refused;
+    shelf_.ship();
+    return A::result_done;
+  }
+
   /// The battery rests between samples while nobody uses it. An insulation monitor that measures is being used. Returns
   /// true if it is to be switched off (firmware/shelf.hpp).
   template <std::size_t Cells>
@@ -68,8 +82,8 @@ class TruckSide {
                       board.truck.is_on(hal::TruckInput::key) || board.insulation.ohm != measurement::no_reading;
     hal::set_parked(!used);
     const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
-    return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release,
-                         !used && !hal::can_listening(), pack.time_us);
+    return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release, used,
+                         !hal::can_listening(), pack.time_us);
   }
 
  private:
