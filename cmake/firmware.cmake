@@ -48,12 +48,14 @@ set(build ${PROJECT_BINARY_DIR})
 set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
 set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS)
 foreach(value ${of_pack_and_truck} ${of_inputs})
-  set(wanted_${value} ${BMS_${value}})
+  if(DEFINED BMS_${value})
+    set(wanted_${value} "${BMS_${value}}")  # OFF and an empty list are wishes, too
+  endif()
 endforeach()
 include(${root}/boards/${BMS_BOARD}/board.cmake)
-foreach(value ${of_inputs})
-  if(wanted_${value})
-    set(BMS_${value} ${wanted_${value}})
+foreach(value ${of_pack_and_truck} ${of_inputs})
+  if(DEFINED wanted_${value})
+    set(BMS_${value} "${wanted_${value}}")
   endif()
 endforeach()
 foreach(value INSULATION SECOND_CURRENT)
@@ -61,8 +63,9 @@ foreach(value INSULATION SECOND_CURRENT)
     set(BMS_${value} absent)
   endif()
 endforeach()
-if(NOT BMS_CLOSES_BY_INPUTS)
-  set(BMS_CLOSES_BY_INPUTS false)
+set(closes_by_inputs false)
+if(BMS_CLOSES_BY_INPUTS)
+  set(closes_by_inputs true)
 endif()
 set(second_current_possible true)
 if(BMS_SECOND_CURRENT STREQUAL "absent")
@@ -70,18 +73,19 @@ if(BMS_SECOND_CURRENT STREQUAL "absent")
 endif()
 list(REMOVE_ITEM BMS_INPUTS none)
 list(REMOVE_ITEM BMS_OUTPUTS none)
+set(may_stop false)
+if(BMS_SAMPLES STREQUAL "bq76952")
+  set(may_stop true)
+endif()
 set(truck_side false)
-if(BMS_INPUTS OR NOT BMS_INSULATION STREQUAL "absent")
+if(BMS_INPUTS OR second_current_possible OR NOT BMS_INSULATION STREQUAL "absent")
   set(truck_side true)
 endif()
 bms_bits(input_bits BMS_INPUTS "key;charger_plug;coil_supply;interlock;crash" "${BMS_INPUTS}")
 bms_bits(output_bits BMS_OUTPUTS "heater;fan;soc_lamp" "${BMS_OUTPUTS}")
 set(of_truck)
 foreach(value ${of_pack_and_truck})
-  if(wanted_${value})
-    set(BMS_${value} ${wanted_${value}})
-  endif()
-  if(BMS_${value})
+  if(NOT "${BMS_${value}}" STREQUAL "")
     list(APPEND of_truck ${value} ${BMS_${value}})
   endif()
 endforeach()
@@ -124,7 +128,7 @@ bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.c
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
   PARAMETERS ${BMS_PARAMETERS} INPUTS ${input_bits} OUTPUTS ${output_bits} INSULATION ${BMS_INSULATION}
-  CLOSES_BY_INPUTS ${BMS_CLOSES_BY_INPUTS} SECOND_CURRENT ${second_current_possible} TRUCK_SIDE ${truck_side})
+  CLOSES_BY_INPUTS ${closes_by_inputs} SECOND_CURRENT ${second_current_possible} TRUCK_SIDE ${truck_side})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
 set(BMS_CELL_HEADER_TOOL "" CACHE FILEPATH "cell_header of a host build; empty: build it")
@@ -256,14 +260,14 @@ set(can_bxcan ${chip}/bxcan.cpp)
 set(no_chain ${absent_hal}/calibration.cpp ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp
   ${absent_hal}/second_current.cpp ${no_truck})  # for a board without a measuring chain
 set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp ${no_chain})
-set(samples_remote ${hal}/remote/samples.cpp ${hal}/frame_dispatch.cpp ${no_chain})
+set(samples_remote ${hal}/remote/samples.cpp ${absent_hal}/sleep.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
   ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_truck})
 # The settings of the chip's own protections follow the cell file.
 set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
   ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
-  ${chip}/i2c.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp ${auxiliary_contacts}
-  ${second_current} ${truck_pins} ${insulation})
+  ${chip}/i2c.cpp ${chip}/sleep.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp
+  ${auxiliary_contacts} ${second_current} ${truck_pins} ${insulation})
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
@@ -306,7 +310,8 @@ bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cel
   ${generated_headers})
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
 foreach(objects application estimator_step)
-  target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_BOARD="${BMS_BOARD}")
+  target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_MAY_STOP=${may_stop}
+    BMS_BOARD="${BMS_BOARD}")
 endforeach()
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
   OUTPUT_FORMAT HEXADECIMAL)

@@ -114,6 +114,11 @@ class Application {
     serve_update<Board>(
         pack, inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
         !board_.state.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
+    if constexpr (requires { requires Board::may_stop; }) {
+      if (!truck_.park(pack, inputs, charger, protection_.decision(), board_, Board::plan())) return;
+      shut_down();
+      hal::switch_off();
+    }
   }
 
   /// Stores the state when the battery is switched off. The last call.
@@ -323,6 +328,7 @@ class Application {
 
   template <class May>
   [[gnu::noinline]] std::uint32_t handle_parameters(const can::Command& command, May&& may) {
+    if (const auto result = truck_.command(command, protection_.decision().outputs.any_closed(), may)) return *result;
     auto& block = Board::parameters();
     const std::uint16_t before = block.revision();
     const std::uint32_t result =

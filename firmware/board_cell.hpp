@@ -53,6 +53,7 @@ using BoardVehicleProfile = ProfileOf<hal::vehicle_profile>::Type;
 struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_SLOT> {
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
+  static constexpr bool may_stop = BMS_MAY_STOP;  ///< between samples, while the battery is parked (hal/sleep.hpp)
 
   static Estimator::Result step(Estimator& estimator, const measurement::Sample& sample) {
     return estimator_step(estimator, sample);

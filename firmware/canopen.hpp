@@ -1,20 +1,22 @@
 // A minimal CANopen slave (CiA 301): network management (NMT), heartbeat and an SDO server for values of up to four
-// bytes.
+// bytes and for texts that are read.
 //
 //   000h          in     NMT: start, stop, pre-operational or reset, for this node or for all
 //   700h + node   out    boot-up once, then the state every heartbeat_us
-//   600h + node   in     SDO: read or write an object in one frame (expedited transfer)
+//   600h + node   in     SDO: read or write an object in one frame (expedited transfer), read a text in segments
 //   580h + node   out    the answer, or an abort code
 //   700h + peer   in     heartbeat of one other node
 //
 // The node becomes operational without a master, because a truck may have none. In state "stopped" it sends only its
-// heartbeat. Segmented and block transfers are refused. The owner implements the objects: read(index, sub) and
-// write(index, sub, value, length). Source: CiA 301 version 4.2.0, sections 7.2.4 (SDO) and 7.2.8 (NMT), as public
+// heartbeat. Block transfers, and writing in segments, are refused. The owner implements the objects: read(index, sub)
+// and write(index, sub, value, length). Source: CiA 301 version 4.2.0, sections 7.2.4 (SDO) and 7.2.8 (NMT), as public
 // implementations have it.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string_view>
 
 #include "firmware/cycle.hpp"
 #include "hal/bytes.hpp"
@@ -29,6 +31,7 @@ enum class NodeState : std::uint8_t { boot_up = 0, stopped = 4, operational = 5,
 /// SDO abort codes; none means success.
 enum class AbortCode : std::uint32_t {
   none = 0,
+  toggle_not_alternated = 0x0503'0000,
   unknown_command = 0x0504'0001,
   read_only = 0x0601'0002,
   no_such_object = 0x0602'0000,
@@ -41,6 +44,7 @@ struct Entry {
   std::uint32_t value = 0;
   std::uint8_t length = 0;  ///< bytes: 1, 2 or 4
   AbortCode abort_code = AbortCode::none;
+  std::string_view text{};  ///< if not empty, instead of value; of static storage
 };
 
 class Node {
@@ -76,7 +80,8 @@ class Node {
  private:
   static constexpr std::uint8_t start = 1, stop = 2, enter_pre_operational = 128, reset_node = 129,
                                 reset_communication = 130;
-  static constexpr std::uint8_t download = 1, upload = 2, abort = 4;  // client command specifiers: the upper three bits
+  // client command specifiers: the upper three bits
+  static constexpr std::uint8_t download = 1, upload = 2, upload_segment = 3, abort = 4;
   static constexpr std::size_t value_at = 4;
 
   constexpr void apply_nmt_command(std::uint8_t command) {
@@ -91,25 +96,47 @@ class Node {
   }
 
   template <class Objects>
-  void serve_sdo(const can::Frame& request, Objects& objects) const {
+  void serve_sdo(const can::Frame& request, Objects& objects) {
     const auto index = hal::get_bytes<std::uint16_t>(request.data, 1);
     const std::uint8_t command = request.data[0] >> 5, sub = request.data[3];
+    if (command == upload_segment) return send_segment(request);
+    rest_ = {};  // a new transfer ends the one before
     if (command == abort) return;
     can::Frame answer{sdo_answer_id + id_, 8, {0, request.data[1], request.data[2], sub}};
     AbortCode abort_code = AbortCode::unknown_command;
     if (command == upload) {
       const Entry entry = objects.read(index, sub);
       abort_code = entry.abort_code;
-      answer.data[0] = static_cast<std::uint8_t>(0x43 | (4 - entry.length) << 2);
-      hal::put_bytes(answer.data, value_at, entry.value);
+      rest_ = entry.text;
+      toggle_ = 0;
+      answer.data[0] = static_cast<std::uint8_t>(rest_.empty() ? 0x43 | (4 - entry.length) << 2 : 0x41);
+      hal::put_bytes(answer.data, value_at, rest_.empty() ? entry.value : static_cast<std::uint32_t>(rest_.size()));
     } else if (command == download && (request.data[0] & 3) == 3) {  // expedited, with its length
       abort_code = objects.write(index, sub, hal::get_bytes<std::uint32_t>(request.data, value_at),
                                  static_cast<std::uint8_t>(4 - (request.data[0] >> 2 & 3)));
       answer.data[0] = 0x60;
     }
-    if (abort_code != AbortCode::none) {
-      answer.data[0] = 0x80;
-      hal::put_bytes(answer.data, value_at, static_cast<std::uint32_t>(abort_code));
+    if (abort_code != AbortCode::none) make_abort(answer, abort_code);
+    hal::can_send(answer);
+  }
+
+  static void make_abort(can::Frame& answer, AbortCode code) {
+    answer.data[0] = 0x80;
+    hal::put_bytes(answer.data, value_at, static_cast<std::uint32_t>(code));
+  }
+
+  /// The next seven characters; bit 4 alternates, bit 0 says that they are the last ones.
+  void send_segment(const can::Frame& request) {
+    can::Frame answer{sdo_answer_id + id_, 8, {}};
+    if (rest_.empty() || (request.data[0] & 0x10) != toggle_) {
+      make_abort(answer, rest_.empty() ? AbortCode::unknown_command : AbortCode::toggle_not_alternated);
+      rest_ = {};
+    } else {
+      const std::size_t sent = std::min<std::size_t>(rest_.size(), 7);
+      answer.data[0] = static_cast<std::uint8_t>(toggle_ | (7 - sent) << 1 | (sent == rest_.size() ? 1U : 0U));
+      std::ranges::copy(rest_.substr(0, sent), answer.data.begin() + 1);
+      rest_.remove_prefix(sent);
+      toggle_ ^= 0x10;
     }
     hal::can_send(answer);
   }
@@ -117,6 +144,8 @@ class Node {
   Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
+  std::string_view rest_{};  ///< of a text that is read
+  std::uint8_t toggle_ = 0;
 };
 
 /// Another node, as its heartbeat shows it.

@@ -28,6 +28,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <string_view>
 #include <tuple>
 
 #include "firmware/canopen.hpp"
@@ -97,6 +98,7 @@ class Cia418Profile {
  private:
   static constexpr std::int16_t no_value = 0x7FFF;
   static constexpr std::uint32_t device_type = 418;
+  static constexpr std::string_view device_name = "greybox-bms battery";
 
   template <class Estimator, std::size_t Cells>
   void update_objects(const Snapshot<Estimator, Cells>& now) {
@@ -135,6 +137,8 @@ class Cia418Profile {
         return {device_type, 4};
       case 0x1001:
         return {0, 1};  // error register: the faults are in the message Faults
+      case 0x1008:
+        return {.text = device_name};
       case 0x1017:
         return {canopen::Node::heartbeat_us / 1'000, 2};
       case 0x6000:

@@ -49,9 +49,11 @@ inline Losses read_hardware(std::int32_t fitted, BoardStatus& board, protection:
   }
   hal::TruckInputs truck = hal::truck_inputs();
   truck.fitted &= static_cast<std::uint32_t>(fitted / parameters::first_truck_input);
-  board.truck = truck;
   using enum hal::TruckInput;
-  inputs.coils_dead = truck.is_off(coil_supply) || (truck.has(coil_supply) && truck.coil_losses != 0);
+  // A supply that is back already has opened the contactors, too: the bus says so.
+  if (truck.coil_losses != 0) truck.on &= ~static_cast<std::uint32_t>(coil_supply);
+  board.truck = truck;
+  inputs.coils_dead = truck.is_off(coil_supply);
   inputs.interlock_open = truck.is_off(interlock);
   inputs.crashed = truck.is_off(crash);
   const Losses losses{contacts.losses, truck.coil_losses, hal::supply_falls()};

@@ -2,16 +2,17 @@
 // displays of other makers. RV-C is a J1939 protocol with open layouts (firmware/can/j1939_profile.dbc; sources:
 // firmware/can/messages.md). Build option: BMS_VEHICLE_PROFILE=j1939.
 //
-// Each message has its own cycle, in the time of the samples, and is sent while a node listens. Nothing is received: no
-// address is claimed and no request is answered. There is no end-to-end protection: use the battery's own messages for
-// everything that opens contactors. The allowed discharge current has no signal here, only DischargeOn. Cost: six
-// frames of at most 160 bits, seven per second: 0.5 % of 250 kbit/s.
+// Each message has its own cycle, in the time of the samples, and is sent while a node listens, from an address that is
+// claimed (j1939_address.hpp). No other request is answered. There is no end-to-end protection: use the battery's own
+// messages for everything that opens contactors. The allowed discharge current has no signal here, only DischargeOn.
+// Cost: six frames of at most 160 bits, seven per second: 0.5 % of 250 kbit/s.
 #pragma once
 
 #include <cstdint>
 #include <tuple>
 
 #include "firmware/cycle.hpp"
+#include "firmware/j1939_address.hpp"
 #include "firmware/messages.hpp"
 #include "firmware/power_requests.hpp"
 #include "firmware/snapshot.hpp"
@@ -115,6 +116,7 @@ class J1939Profile {
   void publish(const Snapshot<Estimator, Cells>& now) {
     if (!hal::can_listening()) return;
     now_us_ = static_cast<std::uint32_t>(now.pack.time_us);
+    if (!address_.update(now.pack.time_us)) return;
     send_if_due<j1939::DcSourceStatus1>([&] { return j1939::status_1(now); });
     send_if_due<j1939::DcSourceStatus2>([&] { return j1939::status_2(now); });
     send_if_due<j1939::DcSourceStatus3>([&] { return j1939::status_3(now); });
@@ -123,7 +125,7 @@ class J1939Profile {
     send_if_due<j1939::DcSourceStatus11>([&] { return j1939::status_11(now); });
   }
 
-  constexpr void receive(const can::Frame&, std::uint64_t) {}
+  void receive(const can::Frame& frame, std::uint64_t now_us) { address_.receive(frame, now_us); }
   constexpr ChargerState charger(std::uint64_t) const { return {}; }
 
  private:
@@ -138,9 +140,13 @@ class J1939Profile {
 
   template <class Message, class Make>
   void send_if_due(Make&& message) {
-    if (std::get<SendState<Message>>(sent_).due(now_us_, Message::cycle_us)) hal::can_send(message().frame());
+    if (!std::get<SendState<Message>>(sent_).due(now_us_, Message::cycle_us)) return;
+    can::Frame frame = message().frame();
+    frame.id = (frame.id & ~std::uint32_t{0xFF}) | address_.value();
+    hal::can_send(frame);
   }
 
+  j1939::Address address_{j1939::Name{}.value()};
   typename SendStatesOf<can::j1939::Messages>::type sent_{};
   std::uint32_t now_us_ = 0;
 };

@@ -1,13 +1,19 @@
 // The truck around the battery: its inputs, its heater, fan and lamp, its insulation, its second current sensor.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 
+#include "firmware/commands.hpp"
 #include "firmware/current_referee.hpp"
 #include "firmware/hardware_inputs.hpp"
 #include "firmware/insulation_monitor.hpp"
+#include "firmware/shelf.hpp"
 #include "firmware/truck_outputs.hpp"
+#include "hal/can.hpp"
+#include "hal/sleep.hpp"
 
 namespace bms::firmware {
 
@@ -54,10 +60,37 @@ class TruckSide {
     }
   }
 
+  /// Returns the result of a command that is for the truck, if it is.
+  template <class May>
+  std::optional<std::uint32_t> command(const can::Command& command, bool closed, May&& may) {
+    using A = can::CommandAnswer;
+    if (command.code != can::Command::code_switch_off) return std::nullopt;
+    if (command.argument != 0) return A::result_refused;
+    if (!may(Privilege::service)) return A::result_not_authorised;
+    if (closed) return A::result_refused;
+    shelf_.ship();
+    return A::result_done;
+  }
+
+  /// The battery rests between samples while nobody uses it. An insulation monitor that measures is being used. Returns
+  /// true if it is to be switched off (firmware/shelf.hpp).
+  template <std::size_t Cells>
+  bool park(const measurement::PackSample<Cells>& pack, const protection::ExternalInputs& inputs,
+            const ChargerState& charger, const protection::Decision& decision, const BoardStatus& board,
+            const protection::ProtectionPlan& plan) {
+    const bool used = inputs.request != protection::Request::none || charger.present || decision.outputs.any_closed() ||
+                      board.truck.is_on(hal::TruckInput::key) || board.insulation.ohm != measurement::no_reading;
+    hal::set_parked(!used);
+    const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
+    return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release, used,
+                         !hal::can_listening(), pack.time_us);
+  }
+
  private:
   InsulationMonitor<hal::insulation_monitor> insulation_;
   TruckOutputs outputs_;
   CurrentReferee referee_;
+  Shelf shelf_;
 };
 
 }  // namespace bms::firmware

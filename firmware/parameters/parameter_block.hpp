@@ -95,6 +95,8 @@ class ParameterBlock {
   }
 
  private:
+  static constexpr int known_inputs_shift = 16;
+
   static constexpr bool newer(std::uint16_t a, std::uint16_t b) { return static_cast<std::int16_t>(a - b) > 0; }
 
   /// What is known of the set outside its copies. The bus first: a loss of power in between leaves the old revision,
@@ -120,11 +122,20 @@ class ParameterBlock {
   }
   /// Returns true if at least one copy is stored: the other one is written again at the next start.
   bool store(storage::Persistence& persistence) const {
-    const ParametersRecord record{.revision = revision_, .count = parameter_count, .values = active_};
+    ParametersRecord record{.revision = revision_, .count = parameter_count, .values = active_};
+    at(record.values, Parameter::inputs_fitted) |= at(*ranges_, Parameter::inputs_fitted).highest << known_inputs_shift;
     std::array<std::uint8_t, storage::max_payload_bytes> bytes;
     const storage::Bytes payload = encode(record, bytes);
     const bool first = persistence.store_block(ParametersRecord::kind, payload);
     return persistence.store_block(ParametersRecord::copy, payload) || first;
+  }
+  /// An input that the image of the record did not have is fitted as the build says: a set of an older image must not
+  /// switch it off. The upper half of the stored value has the inputs of that image; in the first records it is empty,
+  /// and those images had two.
+  constexpr std::int32_t inputs_of(std::int32_t stored) const {
+    const std::int32_t known = stored >> known_inputs_shift,
+                       had = known != 0 ? known : auxiliary_contacts_fitted | second_current_fitted;
+    return (stored & ((1 << known_inputs_shift) - 1)) | (at(*ranges_, Parameter::inputs_fitted).initial & ~had);
   }
   void adopt(const ParametersRecord& record) {
     revision_ = record.revision;
@@ -132,7 +143,7 @@ class ParameterBlock {
     Values values = initial_values(*ranges_);
     for (std::size_t k = 0; k < record.count; ++k) {
       const auto parameter = static_cast<Parameter>(k + 1);
-      const std::int32_t value = record.values[k];
+      const std::int32_t value = parameter == Parameter::inputs_fitted ? inputs_of(record.values[k]) : record.values[k];
       values[k] =
           possible(parameter, value, *ranges_) ? value : std::clamp(value, (*ranges_)[k].lowest, (*ranges_)[k].highest);
       if (!possible(parameter, values[k], *ranges_)) values[k] = (*ranges_)[k].initial;

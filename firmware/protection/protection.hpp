@@ -229,8 +229,9 @@ class Protection {
     return s.current_ua != measurement::no_reading || s.pack_uv != measurement::no_reading ||
            std::any_of(s.cell_uv.begin(), s.cell_uv.end(),
                        [](std::int32_t uv) { return uv != measurement::no_reading; }) ||
-           std::any_of(s.temperature_cdegc.begin(), s.temperature_cdegc.end(),
-                       [](std::int16_t cdegc) { return cdegc != measurement::no_temperature; });
+           std::any_of(s.temperature_cdegc.begin(), s.temperature_cdegc.end(), [](std::int16_t cdegc) {
+             return cdegc != measurement::no_temperature && cdegc != measurement::shorted_thermistor;
+           });
   }
 
   constexpr bool may_drive() const {

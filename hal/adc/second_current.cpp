@@ -1,8 +1,9 @@
 // A Hall sensor as second current sensor, measured by the chip's own converter.
 //
 // The Hall sensor's value at no current depends on its supply, which is not measured: 2 % of 5 V are 20 A. It is
-// learned while all outputs are off, over 0.8 s; until then the second current is not known. A sensor that is broken at
-// the start is far from its value at no current, is never learned, and stays without a reading.
+// learned while all outputs are off, over 0.8 s; until then the second current is not known. At the start they have
+// been off since the reset, so 0.3 s are enough: a request that goes on closes them again after half a second. A sensor
+// that is broken at the start is far from its value at no current, is never learned, and stays without a reading.
 #include "hal/second_current.hpp"
 #include "hal/adc/conversions.hpp"
 #include "hal/contactor_pins.hpp"
@@ -15,7 +16,7 @@ constexpr std::int32_t most_offset_ua = 40'000'000;
 constexpr std::uint8_t learning_samples = 8;
 
 std::int32_t zero_ua = 0;
-std::uint8_t open_samples = 0;  ///< in a row with all outputs off
+std::uint8_t open_samples = learning_samples - 3;  ///< in a row with all outputs off
 bool learned = false;
 
 }  // namespace

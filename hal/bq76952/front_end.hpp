@@ -65,6 +65,11 @@ class FrontEnd {
   /// stops after 20 s.
   void bleed(std::uint32_t inputs) { bleed_ = static_cast<std::uint16_t>(inputs); }
 
+  /// SHUTDOWN: its outputs and REG1 go off, until TS2 is pulled low or LD rises. Sealed it has to be sent twice.
+  void shut_down() {
+    for (int k = 0; k < 2; ++k) static_cast<void>(wire_.select(shutdown));
+  }
+
   /// SecondLineTrip bits of the last read().
   std::uint32_t trips() const { return trips_; }
   /// Ends a latched short circuit with the next read(). Has no effect unless the chip is measuring.

@@ -17,6 +17,7 @@
 #include "hal/i2c.hpp"
 #include "hal/power_path.hpp"
 #include "hal/second_line.hpp"
+#include "hal/sleep.hpp"
 
 namespace bms::hal {
 
@@ -45,7 +46,7 @@ const measurement::PackSample<pack_cells>* next_sample() {
     started = true;
     due_us = now_us() + period_us;
   }
-  for (receive_frames(); now_us() < due_us; receive_frames()) wait_for_interrupt();
+  for (receive_frames(); now_us() < due_us; receive_frames()) rest_until(due_us);
   measurement::PackSample<bq76952::cell_inputs> inputs;
   inputs.time_us = now_us();
   due_us = inputs.time_us - due_us < period_us ? due_us + period_us : inputs.time_us + period_us;
@@ -75,6 +76,8 @@ FrontEndHealth front_end_health() {
   if (state == State::measure) health.state = FrontEndState::measuring;
   return health;
 }
+
+void switch_off() { front_end.shut_down(); }
 
 void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);

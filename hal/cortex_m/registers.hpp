@@ -18,11 +18,14 @@ namespace cortex_m {
 // interrupt controller [B3.4]: interrupts 0 to 31 and 32 to 63
 inline Register& nvic_iser0() { return at<0xE000E100>(); }
 inline Register& nvic_icer0() { return at<0xE000E180>(); }
+inline Register& nvic_icpr0() { return at<0xE000E280>(); }
 inline Register& nvic_iser1() { return at<0xE000E104>(); }
+inline Register& nvic_icer1() { return at<0xE000E184>(); }
 
 // system control [B3.2]
 inline Register& scb_icsr() { return at<0xE000ED04>(); }
 inline Register& scb_aircr() { return at<0xE000ED0C>(); }
+inline Register& scb_scr() { return at<0xE000ED10>(); }
 
 }  // namespace cortex_m
 

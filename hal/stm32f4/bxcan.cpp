@@ -22,12 +22,14 @@
 #include <array>
 #include <atomic>
 #include <span>
+#include <utility>
 
 #include "hal/accepted_frames.hpp"
 #include "hal/bxcan/bit_timing.hpp"
 #include "hal/bxcan/filter_banks.hpp"
 #include "hal/bxcan/transmit_queue.hpp"
 #include "hal/can.hpp"
+#include "hal/can_suspend.hpp"
 #include "hal/clock.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
@@ -179,9 +181,9 @@ std::atomic<std::uint32_t> received{0}, taken{0}, lost{0}, overruns{0};
 
 enum class Phase : std::uint8_t { off, resting, entering, joining, on };
 Phase phase = Phase::off;
-std::uint64_t phase_since_us = 0, progress_us = 0, paused_since_us = 0;
+std::uint64_t phase_since_us = 0, progress_us = 0, paused_since_us = 0, active_us = 0;
 std::uint32_t rest_us = first_rest_us, bus_offs = 0, failed_starts = 0, seen_sent = 0, seen_received = 0;
-bool paused = false;
+bool paused = false, suspended = false;
 
 void enter(Phase next) {
   phase = next;
@@ -237,6 +239,7 @@ void watch_transmission() {
   const std::uint32_t out = sent.load(std::memory_order_relaxed), in = received.load(std::memory_order_relaxed);
   const std::uint64_t now = now_us();
   if (out != seen_sent) rest_us = first_rest_us;
+  if (out != seen_sent || in != seen_received) active_us = now;
   if (paused && (in != seen_received || now - paused_since_us >= pause_us)) {
     paused = false;
     progress_us = now;
@@ -270,8 +273,8 @@ void service() {
       return enter(Phase::joining);
     case Phase::joining:
       if (!initialising && !bus_off) {
-        paused = false;
-        progress_us = now_us();
+        paused = std::exchange(suspended, false);
+        paused_since_us = progress_us = now_us();
         return enter(Phase::on);
       }
       if (elapsed >= timing->phase_timeout_us) abandon_phase();
@@ -309,6 +312,16 @@ bool can_listening() {
   service();
   return on_the_bus() && !paused;
 }
+
+bool can_suspend(std::uint64_t quiet_us) {
+  if (phase != Phase::on || !paused || now_us() - active_us < quiet_us) return false;
+  ask_for_initialisation();
+  suspended = true;
+  while ((can1_msr() & msr_inak) == 0 && now_us() - phase_since_us < 50) continue;
+  return (can1_msr() & msr_inak) != 0;
+}
+
+void can_active() { active_us = now_us(); }
 
 bool can_send(const can::Frame& frame) {
   const TransmitInterruptLock lock;

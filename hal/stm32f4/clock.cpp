@@ -1,6 +1,7 @@
 // Microseconds from the SysTick timer: an interrupt every millisecond, and the timer's value in between.
 #include "hal/clock.hpp"
 
+#include "hal/stm32f4/clock_stop.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
 #include "hal/supply.hpp"
@@ -11,6 +12,7 @@ namespace {
 
 volatile std::uint32_t milliseconds_low = 0, milliseconds_high = 0;
 std::uint32_t ticks_per_us = 16;
+std::uint64_t resumed_us = 0;  ///< time at which SysTick began to count, after a stop
 
 }  // namespace
 
@@ -28,8 +30,22 @@ std::uint64_t now_us() {
     const std::uint32_t high = milliseconds_high, low = milliseconds_low;
     const std::uint32_t ticks = stm32f4::syst_rvr() - stm32f4::syst_cvr();
     if (low == milliseconds_low && high == milliseconds_high)
-      return (static_cast<std::uint64_t>(high) << 32 | low) * 1'000 + ticks / ticks_per_us;
+      return resumed_us + (static_cast<std::uint64_t>(high) << 32 | low) * 1'000 + ticks / ticks_per_us;
   }
+}
+
+void stm32f4::pause_clock() {
+  resumed_us = now_us();
+  syst_csr() = 0;
+  scb_icsr() = 1U << 25;  // no tick is pending
+  milliseconds_low = 0;
+  milliseconds_high = 0;
+}
+
+void stm32f4::resume_clock(std::uint64_t stopped_us) {
+  resumed_us += stopped_us;
+  syst_cvr() = 0;
+  syst_csr() = 7;
 }
 
 std::uint32_t core_clock_hz() { return stm32f4::clocks().core_hz; }

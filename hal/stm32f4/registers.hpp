@@ -127,18 +127,23 @@ inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
 
 // external interrupts [12.3], their ports [9.2]
 inline Register& syscfg_exticr2() { return at<0x4001380C>(); }
+inline Register& syscfg_exticr3() { return at<0x40013810>(); }
 inline Register& syscfg_exticr4() { return at<0x40013814>(); }
 inline Register& exti_imr() { return at<0x40013C00>(); }
 inline Register& exti_rtsr() { return at<0x40013C08>(); }
 inline Register& exti_ftsr() { return at<0x40013C0C>(); }
 inline Register& exti_pr() { return at<0x40013C14>(); }
-inline constexpr unsigned pvd_interrupt = 1, exti4_interrupt = 10, exti15_10_interrupt = 40;
+inline constexpr unsigned pvd_interrupt = 1, rtc_wakeup_interrupt = 3, exti4_interrupt = 10, exti9_5_interrupt = 23,
+                          exti15_10_interrupt = 40;
 
 // real-time clock [26.6]
 inline Register& rtc_tr() { return at<0x40002800>(); }
 inline Register& rtc_dr() { return at<0x40002804>(); }
+inline Register& rtc_cr() { return at<0x40002808>(); }
 inline Register& rtc_isr() { return at<0x4000280C>(); }
 inline Register& rtc_prer() { return at<0x40002810>(); }
+inline Register& rtc_wutr() { return at<0x40002814>(); }
+inline Register& rtc_ssr() { return at<0x40002828>(); }
 inline Register& rtc_wpr() { return at<0x40002824>(); }
 /// Backup register 0; 19 more follow.
 inline Register& rtc_bkp0r() { return at<0x40002850>(); }

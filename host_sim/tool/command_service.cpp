@@ -31,18 +31,16 @@ struct ServiceOptions {
 };
 
 const std::map<std::string, std::uint32_t>& commands() {
-  static const std::map<std::string, std::uint32_t> all{{"clear-faults", can::Command::code_clear_faults},
-                                                        {"clear-latched", can::Command::code_clear_faults},
-                                                        {"set-time", can::Command::code_set_time},
-                                                        {"voltage-gain", can::Command::code_voltage_gain},
-                                                        {"voltage-offset", can::Command::code_voltage_offset},
-                                                        {"current-gain", can::Command::code_current_gain},
-                                                        {"current-offset", can::Command::code_current_offset}};
+  static const std::map<std::string, std::uint32_t> all{
+      {"clear-faults", can::Command::code_clear_faults}, {"clear-latched", can::Command::code_clear_faults},
+      {"set-time", can::Command::code_set_time},         {"switch-off", can::Command::code_switch_off},
+      {"voltage-gain", can::Command::code_voltage_gain}, {"voltage-offset", can::Command::code_voltage_offset},
+      {"current-gain", can::Command::code_current_gain}, {"current-offset", can::Command::code_current_offset}};
   return all;
 }
 
 std::uint32_t argument_of(const ServiceOptions& o) {
-  if (o.what == "clear-faults") return 0;
+  if (o.what == "clear-faults" || o.what == "switch-off") return 0;
   if (o.what == "clear-latched") return 1;
   if (o.what == "set-time" && o.given->count() == 0) return static_cast<std::uint32_t>(std::time(nullptr));
   if (o.given->count() == 0)
@@ -59,9 +57,11 @@ class ServiceCommand final : public Command {
         "service", "Send a command that needs a service session: clear faults, set the time, calibrate");
     c.footer("Example: bms service can0 clear-latched --key pack17.key --operator 42");
     c.add_option("source", o_.source, "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter")->required();
-    c.add_option("command", o_.what,
-                 "clear-faults; clear-latched: also those that only a workshop clears; set-time; voltage-gain, "
-                 "current-gain [ppm]; voltage-offset [uV], current-offset [uA]")
+    c.add_option(
+         "command", o_.what,
+         "clear-faults; clear-latched: also those that only a workshop clears; set-time; switch-off: for transport "
+         "and storage, until key or plug; voltage-gain, "
+         "current-gain [ppm]; voltage-offset [uV], current-offset [uA]")
         ->required()
         ->check(CLI::IsMember(commands()));
     c.add_option("--key", o_.key, "device key of this battery, 32 hexadecimal digits")

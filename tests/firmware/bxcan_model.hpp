@@ -77,6 +77,7 @@ class BxcanModel {
   unsigned transmit_errors() const { return tec_; }
   unsigned receive_errors() const { return rec_; }
   bool bus_off() const { return bus_off_; }
+  bool wire_busy() const { return busy_bits_ > 0 || stuck_dominant; }
   bool on_the_bus() const { return mode_ == Mode::normal && !bus_off_; }
 
  private:

@@ -83,23 +83,24 @@ TEST_F(BxcanBoard, J1939ProfileSends29BitFramesAfterTheOwnOnesWithinTheBudgets) 
   UnicornBoard other{with_profile};
   other.flash.bytes = started_once();
   ASSERT_TRUE(other.run_until([&] { return other.can.on_the_bus(); }, 100));
-  const auto part = part_of_the_shift(3);
+  const auto part = part_of_the_shift(6);
   std::vector<Input> inputs;
-  for (const Pack& p : part) inputs.push_back({p, {0, 0}});
+  for (std::size_t k = 0; k < 4; ++k) inputs.push_back({part[k], {0, 0}});
   queue_for(other, inputs);
-  other.run_for_ms(400);
+  other.run_for_ms(500);
   std::map<std::uint32_t, std::vector<can::Frame>> seen;
   for (const SeenFrame& s : other.can.seen) {
     if (s.from_board && s.frame.long_id) seen[s.frame.id].push_back(s.frame);
   }
-  EXPECT_EQ(seen.size(), 6U);
+  EXPECT_EQ(seen.size(), 7U);
+  EXPECT_EQ(seen[0x18EEFF80].size(), 1U) << "with the first sample it claims its address";
   ASSERT_EQ(seen[0x19FFFD80].size(), 3U) << "the samples of this recording are a second apart";
   for (std::size_t k = 0; k < 3; ++k) {
     const auto& d = seen[0x19FFFD80][k].data;
     EXPECT_EQ(d[0], 1);
     EXPECT_EQ(d[1], 120);
-    EXPECT_NEAR(0.05 * (d[2] | d[3] << 8), 1e-6 * part[k].pack_uv, 0.0251);
-    EXPECT_NEAR(0.001 * static_cast<double>(hal::get_bytes<std::uint32_t>(d, 4)) - 2e6, -1e-6 * part[k].current_ua,
+    EXPECT_NEAR(0.05 * (d[2] | d[3] << 8), 1e-6 * part[k + 1].pack_uv, 0.0251);
+    EXPECT_NEAR(0.001 * static_cast<double>(hal::get_bytes<std::uint32_t>(d, 4)) - 2e6, -1e-6 * part[k + 1].current_ua,
                 0.0011);
   }
   bool behind = false;
@@ -113,6 +114,16 @@ TEST_F(BxcanBoard, J1939ProfileSends29BitFramesAfterTheOwnOnesWithinTheBudgets) 
   }
   EXPECT_EQ(other.can_health().dropped, 0U);
   EXPECT_THAT(other.can.violations, IsEmpty());
+  // a node with a smaller NAME has the address, too
+  other.can.seen.clear();
+  other.can.others.push_back({wire_frame({0x18EEFF80, 8, {1}, true}), 0, true});
+  queue_for(other, {{part[4], {0, 0}}, {part[5], {0, 0}}});
+  other.run_for_ms(300);
+  const auto from_board = [&](std::uint32_t id) {
+    return std::ranges::count_if(other.can.seen, [&](const SeenFrame& s) { return s.from_board && s.frame.id == id; });
+  };
+  EXPECT_EQ(from_board(0x18EEFF81), 1);
+  EXPECT_EQ(from_board(0x19FFFD81), 1);
   fmt::print("with the J1939 profile: flash {} bytes, RAM {} bytes\n", size.text + size.data, size.data + size.bss);
 }
 

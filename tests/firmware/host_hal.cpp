@@ -2,6 +2,7 @@
 
 #include "hal/random.hpp"
 #include "hal/requests.hpp"
+#include "hal/sleep.hpp"
 #include "plant/link_poles.hpp"
 
 namespace bms {
@@ -22,6 +23,8 @@ void host_hal::begin() {
   front_end = {};
   second_current_sensor = false;
   second_current_reading_ua = measurement::no_reading;
+  parked = false;
+  switched_off = 0;
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
@@ -83,6 +86,8 @@ void acknowledge_coil_losses(std::uint32_t losses) { host_hal::truck.coil_losses
 void truck_outputs_set(std::uint32_t outputs) { host_hal::truck_outputs = outputs; }
 Insulation insulation() { return host_hal::insulation; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
+void set_parked(bool parked) { host_hal::parked = parked; }
+void switch_off() { ++host_hal::switched_off; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }
 std::optional<std::uint32_t> calendar_s() { return host_hal::calendar; }

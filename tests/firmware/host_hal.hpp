@@ -36,6 +36,8 @@ inline std::uint32_t second_line = 0;
 inline hal::FrontEndHealth front_end;
 inline bool second_current_sensor = false;  ///< is fitted
 inline std::int32_t second_current_reading_ua = measurement::no_reading;
+inline bool parked = false;
+inline unsigned switched_off = 0;  ///< times
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;

@@ -33,6 +33,7 @@ const parameters::Ranges& ranges() {
 
 /// The forklift board with parameters, as firmware/board_parameters.cpp has them.
 struct ParameterCell : host_hal::Table9Board<16> {
+  static constexpr bool may_stop = true;
   static inline std::optional<parameters::ParameterBlock> block;
   static inline parameters::ActivePlan active;
 
@@ -289,6 +290,8 @@ TEST_F(ParametersTest, AClosedContactorRefuses) {
   ASSERT_TRUE(host_hal::switched.main_plus);
   EXPECT_EQ(apply(board, with({{Parameter::charge_current_max, 30}})), Answer::result_refused);
   EXPECT_EQ(at(active(), Parameter::charge_current_max), 60);
+  EXPECT_EQ(result_of(board, workshop.command(can::Command::code_switch_off, 0)), Answer::result_refused);
+  EXPECT_FALSE(host_hal::parked);
 }
 
 /// Makes new_set the active one, until the power fails. Returns true if it did.
@@ -386,6 +389,64 @@ TEST_F(ParametersTest, LostCopiesOpenAndAreReportedUntilAWorkshopAcceptsTheBuild
   ParameterBoard accepted(again.flash());
   EXPECT_FALSE(ParameterCell::parameters().lost());
   EXPECT_EQ(at(active(), Parameter::can_base), 0x500) << "the accepted set keeps the bus";
+}
+
+TEST_F(ParametersTest, AnInputThatIsNewInAnImageIsFittedWhateverAnOlderSetSays) {
+  using parameters::ParametersRecord;
+  FlashModel flash = new_chip;
+  plug_in(&flash);
+  storage::Persistence persistence;
+  persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s());
+  const auto image_with = [](std::int32_t inputs) {
+    return parameters::ranges_of(host_hal::Table9Board<16>::design(0.1), {.inputs_fitted = inputs});
+  };
+  const auto fitted_after_a_start_of = [&](const parameters::Ranges& image) {
+    parameters::ParameterBlock block(image);
+    block.start(persistence);
+    return at(block.active(), Parameter::inputs_fitted);
+  };
+  // a record of an image with two inputs, on a truck without auxiliary contacts
+  ParametersRecord record{.revision = 1, .count = parameters::parameter_count, .values = initial_values(ranges())};
+  at(record.values, Parameter::inputs_fitted) = parameters::second_current_fitted;
+  std::array<std::uint8_t, storage::max_payload_bytes> bytes;
+  const storage::Bytes payload = encode(record, bytes);
+  ASSERT_TRUE(persistence.store_block(ParametersRecord::kind, payload));
+  ASSERT_TRUE(persistence.store_block(ParametersRecord::copy, payload));
+  const parameters::Ranges with_five_more = image_with(127), with_six_more = image_with(255);
+  EXPECT_EQ(fitted_after_a_start_of(with_five_more), 126) << "the interlock would be ignored";
+
+  // what a workshop takes out of an image's inputs stays out
+  parameters::ParameterBlock block(with_five_more);
+  block.start(persistence);
+  block.begin();
+  auto values = block.active();
+  at(values, Parameter::inputs_fitted) = 2 + 16;
+  ASSERT_TRUE(block.set(static_cast<std::uint32_t>(Parameter::inputs_fitted), 2 + 16));
+  ASSERT_TRUE(block.apply(parameters::check_code(values), persistence));
+  EXPECT_EQ(fitted_after_a_start_of(with_five_more), 2 + 16);
+  EXPECT_EQ(fitted_after_a_start_of(with_six_more), 2 + 16 + 128);
+  plug_in(nullptr);
+}
+
+TEST_F(ParametersTest, OnlyAWorkshopSwitchesAnUnusedBatteryOff) {
+  ParameterBoard board(new_chip);
+  run(board, 30);
+  EXPECT_TRUE(host_hal::parked);
+  EXPECT_EQ(host_hal::switched_off, 0U);
+  const auto off = can::Command::code_switch_off;
+  EXPECT_EQ(result_of(board, stranger.command(off, 0)), Answer::result_not_authorised);
+  open_session(board);
+  EXPECT_EQ(result_of(board, workshop.command(off, 1)), Answer::result_refused);
+  run(board, 50);
+  EXPECT_EQ(host_hal::switched_off, 0U);
+  EXPECT_EQ(result_of(board, workshop.command(off, 0)), Answer::result_done);
+  run(board, 15);
+  EXPECT_EQ(host_hal::switched_off, 0U) << "the answer is sent first";
+  run(board, 15);
+  EXPECT_EQ(host_hal::switched_off, 1U);
+  EXPECT_EQ(board.persistence().actions().last(0).code, can::StoredAction::code_switch_off);
+  run(board, 100);
+  EXPECT_EQ(host_hal::switched_off, 1U) << "once, if its key keeps it on";
 }
 
 TEST_F(ParametersTest, AFlippedBitOfThePlanIsAnInternalFault) {

@@ -27,9 +27,17 @@ class RtcModel {
   void power_away(double seconds, bool battery);
   /// A reset of the core: the shadow registers are loaded again.
   void core_reset() { synchronised_ = false; }
+  /// A stop of the core has ended: the shadow registers are out of date until software clears RSF (26.3.6).
+  void stop_ended() { stale_ = true; }
 
   /// Output of the crystal oscillator. LSE_READY stays set if the crystal stops later.
   double lse_hz() const { return crystal && (bdcr & 2) != 0 ? crystal_hz : 0; }
+
+  /// The wake-up timer has expired with its interrupt enabled, and its flag stands.
+  bool wakes() const { return wakeup_flag_ && (cr_ & 1U << 14) != 0; }
+  /// Time until it expires, or infinity.
+  double wakes_after_us() const;
+  void pass_until(double now_us) { advance(now_us); }
 
   bool crystal = true;
   double crystal_after_us = 2e6, crystal_hz = 32'768;
@@ -44,12 +52,16 @@ class RtcModel {
   void advance(double now_us);
   void second();
   double hz() const;
+  double source_hz() const;
   void reset_domain();
 
   double at_us_ = 0, fraction_s_ = 0, crystal_on_us_ = -1;
   std::uint32_t prer_ = 0x007F00FF, dr_shadow_ = 0;
   std::array<std::uint32_t, 20> backup_{};
   int keys_ = 0, prescaler_writes_ = 0;
+  std::uint32_t cr_ = 0, wutr_ = 0xFFFF;
+  double wakeup_count_ = 0;  ///< left of the wake-up timer
+  bool wakeup_flag_ = false, stale_ = false;
   bool initialising_ = false, synchronised_ = false, dr_locked_ = false;
 };
 

@@ -295,6 +295,64 @@ TEST(CurrentReferee, NamesTheSensorThatDoesNotFollowTheVoltages) {
   EXPECT_EQ(CurrentReferee().verdict(), Inputs::wrong_current_sensor_not_known) << "no current has flowed";
 }
 
+TEST(CurrentReferee, IsPublishedWithoutInputsFromTheFirstWrongSensorOn) {
+  TruckDay t;
+  host_hal::second_current_sensor = true;
+  host_hal::second_current_reading_ua = 0;
+  t.run(3);
+  EXPECT_FALSE(last<Inputs>()) << "a board without inputs, and no sensor is wrong";
+  host_hal::second_current_reading_ua = 200'000'000;
+  t.run(4);
+  ASSERT_TRUE(last<Inputs>());
+  EXPECT_EQ(last<Inputs>()->wrong_current_sensor, Inputs::wrong_current_sensor_not_known) << "no current has flowed";
+  host_hal::second_current_reading_ua = 0;
+  t.run(12);
+  can::Command clear;
+  clear.code = can::Command::code_clear_faults;
+  clear.argument = 1;
+  t.send(clear.frame(13));
+  t.run(3);
+  EXPECT_EQ(t.faults(), 0U);
+  EXPECT_EQ(last<Inputs>()->wrong_current_sensor, Inputs::wrong_current_sensor_none);
+}
+
+TEST(Shelf, WaitsForAMinuteOfRest) {
+  constexpr std::int32_t empty_uv = 2'908'000;
+  Shelf shelf;
+  std::uint64_t us = 0;
+  const auto after = [&](int seconds, std::int32_t uv, bool used = false, bool silent = true) {
+    bool off = false;
+    for (int k = 0; k < 10 * seconds; ++k) off = shelf.update(uv, empty_uv, used, silent, us += 100'000) || off;
+    return off;
+  };
+  EXPECT_FALSE(after(3'600, empty_uv));
+  EXPECT_FALSE(after(59, empty_uv - 1));
+  EXPECT_FALSE(after(1, empty_uv)) << "one sample above begins the minute again";
+  EXPECT_FALSE(after(59, empty_uv - 1));
+  EXPECT_FALSE(after(3'600, empty_uv - 1, true)) << "while it is used";
+  EXPECT_FALSE(after(3'600, empty_uv - 1, false, false)) << "while somebody listens";
+  EXPECT_FALSE(after(3'600, measurement::no_reading));
+  EXPECT_TRUE(after(61, empty_uv - 1));
+}
+
+TEST(Shelf, OfAWorkshopWaitsForItsAnswerAndNotForVoltageOrBus) {
+  Shelf shelf;
+  std::uint64_t us = 0;
+  const auto off_after_s = [&](bool used) {
+    for (int k = 1; k < 1'000; ++k) {
+      if (shelf.update(3'300'000, 2'908'000, used, false, us += 100'000)) return 0.1 * k;
+    }
+    return -1.0;
+  };
+  EXPECT_LT(off_after_s(false), 0);
+  shelf.ship();
+  EXPECT_NEAR(off_after_s(false), 2, 0.15);
+  EXPECT_LT(off_after_s(false), 0) << "once, if key or plug keep it on";
+  shelf.ship();
+  EXPECT_LT(off_after_s(true), 0);
+  EXPECT_LT(off_after_s(false), 0) << "used meanwhile: no more";
+}
+
 TEST(TruckOutputs, HeatOnlyAtACharger) {
   TruckOutputs outputs;
   const protection::ProtectionPlan& plan = TruckBoard::plan();

@@ -98,7 +98,7 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   rcc.reset_flags = flags;
   registers_.clear();
   ended_.clear();
-  sleeping_ = systick_pending_ = supply_pending_ = false;
+  sleeping_ = stopped_ = systick_pending_ = supply_pending_ = false;
   active_.clear();
   priorities_.fill(0);
   systick_csr_ = systick_rvr_ = 0;
@@ -306,7 +306,7 @@ void UnicornBoard::pass(std::uint64_t ticks) {
   const std::uint64_t until = ticks_ + ticks, bit_ticks = ticks_per_second / can.bits_per_second;
   const double us = 1e6 * static_cast<double>(ticks) / static_cast<double>(ticks_per_second);
   const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;
-  timer.pass(us, rcc.apb1_timer_hz(), rcc.lsi_hz_now(now_us()), lse_hz);
+  if (!stopped_) timer.pass(us, rcc.apb1_timer_hz(), rcc.lsi_hz_now(now_us()), lse_hz);
   const auto apb1_hz = static_cast<std::uint32_t>(rcc.apb1_hz());
   if (next_bit_ == 0) next_bit_ = bit_ticks;
   while (next_bit_ <= until) {
@@ -315,15 +315,17 @@ void UnicornBoard::pass(std::uint64_t ticks) {
     can.bit(apb1_hz);
     next_bit_ += (quiet + 1) * bit_ticks;
   }
-  if (core_stopped()) next_systick_ += ticks;
+  if (core_stopped() || stopped_) next_systick_ += ticks;
+  if (stopped_) stopped_ticks_ += ticks;
   ticks_ = until;
   rcc.advance(now_us());
+  watch_lines();
   if (const double hz = rcc.core_hz(); hz != core_hz_) {
     if (next_systick_ > ticks_ && hz > 0 && !core_stopped())
       next_systick_ = ticks_ + static_cast<std::uint64_t>(static_cast<double>(next_systick_ - ticks_) * core_hz_ / hz);
     core_hz_ = hz;
   }
-  if ((systick_csr_ & 1) == 0 || core_stopped()) return;
+  if ((systick_csr_ & 1) == 0 || core_stopped() || stopped_) return;
   while (next_systick_ <= ticks_) {
     systick_pending_ = true;
     next_systick_ += static_cast<std::uint64_t>((systick_rvr_ + 1.0) * ticks_a_cycle());
@@ -362,6 +364,7 @@ void UnicornBoard::deliver_interrupt() {
   const std::uint32_t exception = pending_exception();
   if (exception == 0 || core_stopped()) return;
   sleeping_ = false;
+  if (std::exchange(stopped_, false) && rtc != nullptr) rtc->stop_ended();
   if (handling() && priority(exception) >= priority(active_.back())) return;
   if (exception != nmi && reg(UC_ARM_REG_PRIMASK) != 0) return;
   if (exception == systick_exception) systick_pending_ = false;
@@ -453,12 +456,20 @@ void UnicornBoard::ended(const UnicornCore::Run& run) {
         fmt::format("the firmware stops at {:08x}: {}", run.pc, uc_strerror(static_cast<uc_err>(run.error))));
   }
   sleeping_ = !run.at_limit && core_.half_word(run.pc - 2) == 0xBF30;  // wfi
+  if (sleeping_) begin_stop();
 }
 
 /// To the next bit or tick, whichever comes first; in fast runs over bits that change nothing.
 std::uint64_t UnicornBoard::sleep_ticks() const {
-  const std::uint64_t to_tick = next_systick_ > ticks_ ? next_systick_ - ticks_ : 1;
+  const std::uint64_t of_systick = next_systick_ > ticks_ ? next_systick_ - ticks_ : 1,
+                      to_tick = (systick_csr_ & 1) != 0 ? of_systick : ticks_per_second;
   const std::uint64_t to_bit = next_bit_ > ticks_ ? next_bit_ - ticks_ : 1;
+  if (stopped_) {
+    const double wakes_us = rtc != nullptr ? rtc->wakes_after_us() : longest_stop_us;
+    const auto to_wake = static_cast<std::uint64_t>(std::min(longest_stop_us, wakes_us) * (ticks_per_second / 1e6)) + 1;
+    const std::uint64_t to_edge = to_bit + can.quiet_bits() * (ticks_per_second / can.bits_per_second);
+    return std::min({to_wake, to_edge, run_until_ticks_ > ticks_ ? run_until_ticks_ - ticks_ : 1});
+  }
   if (longest_sleep_us <= 0) return std::min(to_tick, to_bit);
   constexpr double ticks_a_us = ticks_per_second / 1e6;
   const double lse_hz = rtc != nullptr ? rtc->lse_hz() : 0;

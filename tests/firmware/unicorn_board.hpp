@@ -116,6 +116,15 @@ class UnicornBoard {
   };
   std::map<std::uint32_t, Peripheral*> plugged;  ///< by base address, one kilobyte each
 
+  /// Stop mode (RM0090, 5.3.5): only lines of EXTI end it. Peripherals, but for the real-time clock and the watchdog,
+  /// have no clock meanwhile.
+  bool stopped() const { return stopped_; }
+  double stopped_ms() const { return static_cast<double>(stopped_ticks_) / (ticks_per_second / 1e3); }
+  unsigned stops = 0;
+  std::function<void()> clock_wakes;  ///< the wake-up timer of the real-time clock expires: line 22
+  std::function<void()> bus_falls;    ///< CAN RX falls while the bus was idle: the line of its pin
+  double longest_stop_us = 5'000;     ///< of a step in stop mode
+
   RtcModel* rtc = nullptr;  ///< with the control register of the backup domain; outlives a board
   /// Sets PVDO of PWR_CSR and raises the interrupt of the detector.
   void supply(bool low);
@@ -173,17 +182,21 @@ class UnicornBoard {
   std::uint32_t reg(int id) const { return core_.reg(id); }
   void set_reg(int id, std::uint32_t value) { core_.set_reg(id, value); }
   void ended(const UnicornCore::Run& run);
+  void begin_stop();
+  void watch_lines();
 
   UnicornCore core_;
   std::vector<Symbol> symbols_;
   std::vector<std::pair<std::uint32_t, Instructions>> patched_;
   std::mt19937 random_;
-  bool sleeping_ = false, systick_pending_ = false, supply_low_ = false, supply_pending_ = false;
+  bool sleeping_ = false, stopped_ = false, bus_was_busy_ = false, clock_woke_ = false, systick_pending_ = false,
+       supply_low_ = false, supply_pending_ = false;
   std::map<std::uint32_t, std::uint32_t> registers_;
   std::uint32_t systick_csr_ = 0, systick_rvr_ = 0;
   std::uint64_t enabled_ = 0;                       ///< interrupts 0 to 63
   std::array<std::uint8_t, 16 + 96> priorities_{};  ///< by exception number
   std::vector<std::uint32_t> active_;               ///< exceptions that are handled, the most urgent last
+  std::uint64_t stopped_ticks_ = 0;
   std::uint64_t ticks_ = 0, next_systick_ = 0, next_bit_ = 0;
   double core_hz_ = 16e6;
   std::uint64_t run_until_ticks_ = 0;

@@ -27,7 +27,7 @@ TEST_F(TelemetryTest, J1939ProfileAddsMessagesInTheUnitsOfRvc) {
     }
     return all;
   };
-  for (int k = 0; k < 21; ++k) {
+  for (int k = 0; k < 24; ++k) {  // 0.3 s for the claim of an address
     with_profile.process_sample(pack);
     pack.time_us += 100'000;
   }

@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: acf925323040449581cb0979eecb8e3ee062f67a68b7b8f8bae60c8a4ce4b40e
+// SHA-256 of that file: cff7a54eb3a8cd437b4f5cda2145d4a8420e165d70d2c9e82a63a6fc2e4fed0c
 #pragma once
 
 #include <array>
@@ -1186,8 +1186,9 @@ struct Command {
   static constexpr std::uint32_t code_read_parameters = 10;
   static constexpr std::uint32_t code_set_parameter = 11;
   static constexpr std::uint32_t code_apply_parameters = 12;
+  static constexpr std::uint32_t code_switch_off = 13;
   static constexpr SignalLayout argument_layout = {20, 32, false, 1.0F, 0.0F, 0.0F, 4294967295.0F, false, 0};
-  std::uint32_t argument = 0;  ///< clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values.
+  std::uint32_t argument = 0;  ///< clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values; switch off: 0, for transport and storage; the battery switches itself off after 2 s with open contactors, and key or plug switch it on again.
   static constexpr SignalLayout parameter_layout = {52, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
   std::uint32_t parameter = 0;  ///< Number of the parameter for set parameter (ParameterValue), 0 for a new set; otherwise 0.
 
@@ -1216,8 +1217,8 @@ struct Command {
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
   static void each_in_words(See&& see) {
-    { static constexpr std::array<ValueName, 12> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}}}; see("Code", "Command code.", std::span<const ValueName>(names)); }
-    see("Argument", "clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values.", std::span<const ValueName>());
+    { static constexpr std::array<ValueName, 13> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}, ValueName{13, "switch off"}}}; see("Code", "Command code.", std::span<const ValueName>(names)); }
+    see("Argument", "clear faults: 0, or 1 by a workshop; log of samples: 1 on, 0 off; set time: seconds since 1970-01-01 UTC; request: 0 none, 1 drive, 2 charge, to be repeated within 5 s; corrections of the measuring chain, signed: gains up to 50,000 ppm, offsets up to 100,000 uV and 5,000,000 uA (boards/porting.md); stored data: 0 for all of it, or the first of its 39 parts plus 256 times their number; one part is sent with each sample; read parameters: as stored data; set parameter: its value, signed, in the unit of its number; apply parameters: CRC-32 of all values; switch off: 0, for transport and storage; the battery switches itself off after 2 s with open contactors, and key or plug switch it on again.", std::span<const ValueName>());
     see("Parameter", "Number of the parameter for set parameter (ParameterValue), 0 for a new set; otherwise 0.", std::span<const ValueName>());
   }
 };
@@ -1242,6 +1243,7 @@ struct CommandAnswer {
   static constexpr std::uint32_t code_read_parameters = 10;
   static constexpr std::uint32_t code_set_parameter = 11;
   static constexpr std::uint32_t code_apply_parameters = 12;
+  static constexpr std::uint32_t code_switch_off = 13;
   static constexpr SignalLayout result_layout = {20, 4, false, 1.0F, 0.0F, 0.0F, 15.0F, false, 0};
   std::uint32_t result = 0;  ///< Result of the command.
   static constexpr std::uint32_t result_done = 0;
@@ -1276,7 +1278,7 @@ struct CommandAnswer {
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
   static void each_in_words(See&& see) {
-    { static constexpr std::array<ValueName, 12> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}}}; see("Code", "Code of the command.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 13> names{{ValueName{1, "clear faults"}, ValueName{2, "log of samples"}, ValueName{3, "set time"}, ValueName{4, "request"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{9, "stored data"}, ValueName{10, "read parameters"}, ValueName{11, "set parameter"}, ValueName{12, "apply parameters"}, ValueName{13, "switch off"}}}; see("Code", "Code of the command.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 4> names{{ValueName{0, "done"}, ValueName{1, "refused"}, ValueName{2, "no such command"}, ValueName{3, "not authorised"}}}; see("Result", "Result of the command.", std::span<const ValueName>(names)); }
     see("CommandCounter", "Counter of the command.", std::span<const ValueName>());
   }
@@ -2952,6 +2954,7 @@ struct StoredAction {
   static constexpr std::uint32_t code_current_gain = 7;
   static constexpr std::uint32_t code_current_offset = 8;
   static constexpr std::uint32_t code_apply_parameters = 12;
+  static constexpr std::uint32_t code_switch_off = 13;
   static constexpr std::uint32_t code_session_opened = 128;
   static constexpr std::uint32_t code_session_locked = 129;
   static constexpr SignalLayout time_layout = {24, 32, false, 1.0F, 0.0F, 0.0F, 4294967295.0F, false, 0};
@@ -2988,7 +2991,7 @@ struct StoredAction {
   template <class See>
   static void each_in_words(See&& see) {
     see("Index", "0 for the newest.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 9> names{{ValueName{1, "clear faults"}, ValueName{3, "set time"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{12, "apply parameters"}, ValueName{128, "session opened"}, ValueName{129, "session locked"}}}; see("Code", "Code of the command; or of the session. 0: no action.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 10> names{{ValueName{1, "clear faults"}, ValueName{3, "set time"}, ValueName{5, "voltage gain"}, ValueName{6, "voltage offset"}, ValueName{7, "current gain"}, ValueName{8, "current offset"}, ValueName{12, "apply parameters"}, ValueName{13, "switch off"}, ValueName{128, "session opened"}, ValueName{129, "session locked"}}}; see("Code", "Code of the command; or of the session. 0: no action.", std::span<const ValueName>(names)); }
     see("Time", "Seconds since 1970-01-01 UTC if the calendar ran (above 946684800), else time in operation.", std::span<const ValueName>());
     see("Number", "Number of the action, modulo 256; the same in StoredActionDetail.", std::span<const ValueName>());
   }

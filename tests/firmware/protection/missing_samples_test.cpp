@@ -91,6 +91,7 @@ TEST(Protection, CountsSamplesWithoutReadingsAsMissing) {
   b.drive_off();
   const std::uint64_t last = b.time_us;
   measurement::PackSample<16> empty;
+  empty.temperature_cdegc[2] = measurement::shorted_thermistor;  // no reading either
   for (empty.time_us = last + 100'000; empty.time_us <= last + 600'000; empty.time_us += 100'000) {
     b.protection.update(empty, b.estimate, b.inputs);
     EXPECT_EQ(b.protection.decision().outputs.any_closed(), empty.time_us - last <= 500'000) << empty.time_us - last;

@@ -119,6 +119,7 @@ int ExtiModel::interrupt(double) {
   const std::uint32_t active = pending_ & mask_;
   if (active == 0) return -1;
   if ((active >> supply_line & 1) != 0) return 1;
+  if ((active >> clock_line & 1) != 0) return 3;
   for (unsigned line = 0; line < 5; ++line) {
     if ((active >> line & 1) != 0) return static_cast<int>(6 + line);
   }

@@ -1,5 +1,5 @@
-// Register model of a GPIO port and of the interrupt lines EXTI0 to EXTI16 of the STM32F405. Written only from RM0090,
-// 8.4, 9.2.4 and 12.3.
+// Register model of a GPIO port and of the interrupt lines EXTI0 to EXTI16 and EXTI22 of the STM32F405. Written only
+// from RM0090, 8.4, 9.2.4 and 12.3.
 //
 // A pin that is not an output floats: the pull-downs of the drivers decide its level. `violations` lists driver errors.
 #pragma once
@@ -48,7 +48,7 @@ class GpioPort : public firmware::UnicornBoard::Peripheral {
 class ExtiModel : public firmware::UnicornBoard::Peripheral {
  public:
   static constexpr std::uint32_t base = 0x40013C00;
-  static constexpr unsigned supply_line = 16;
+  static constexpr unsigned supply_line = 16, clock_line = 22;
 
   explicit ExtiModel(const firmware::UnicornBoard& board) : board_(board) {}
 

@@ -76,6 +76,7 @@ class Days {
     ++tallies_[event].met;
     event_ = event;
     causes_ = causes;
+    coils_may_fail_ = false;
     judge_.allowed |= causes;
     world_.vehicle.forget();
   }
@@ -86,7 +87,8 @@ class Days {
     if (world_.run_until(works, by_itself_ms) >= 0) {
       ++t.alone;
     } else {
-      if ((world_.vehicle.faults_seen() & causes_) == 0) fail("opens and does not say why");
+      const bool coils = coils_may_fail_ && world_.vehicle.coils_dead_seen();
+      if ((world_.vehicle.faults_seen() & causes_) == 0 && !coils) fail("opens and does not say why");
       set_drive_a(world_, 0);
       set_charger_a(world_, 0);
       world_.vehicle.request = Request::none;
@@ -105,7 +107,9 @@ class Days {
 
   void fail(const std::string& what) { outcome_.fail(fmt::format("{}: {}: {}", event_, what, summary(world_))); }
 
+  /// The loss of the coils' supply is a state and no fault: TruckInputs says it.
   void stop_for_an_emergency(double within_ms, double least_s, double most_s) {
+    coils_may_fail_ = true;
     world_.dip_coil_supply(within_ms * random_.uniform() + 1, 1e3 * between(least_s, most_s),
                            setup_.truck.supply.coil_v);
   }
@@ -114,7 +118,8 @@ class Days {
   double dip() {
     const double ms = std::pow(200.0, random_.uniform()), share = random_.uniform();
     const double vdda_v = setup_.truck.supply.vdda_v, least_v = vdda_v - 2.95;
-    if (chance(0.4))
+    coils_may_fail_ = chance(0.4);
+    if (coils_may_fail_)
       world_.dip_coil_supply(1, ms, setup_.truck.supply.coil_v * (0.2 + 0.8 * share));
     else
       world_.dip_vdda(1, ms, least_v + share * share * (vdda_v - least_v));
@@ -292,6 +297,7 @@ class Days {
   std::map<std::string, Tally> tallies_;
   std::string event_;
   std::uint64_t causes_ = 0;
+  bool coils_may_fail_ = false;
 };
 
 std::string table_of(const Result& result) {

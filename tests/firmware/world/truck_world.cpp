@@ -14,7 +14,8 @@ using plant::Relay;
 
 namespace {
 
-constexpr unsigned i2c_clock = 6, i2c_data = 7, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
+constexpr unsigned i2c_clock = 6, i2c_data = 7, can_receive = 8, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15,
+                   port_of_b = 1;
 constexpr unsigned key = 2, charger_plug = 3, coil_supply = 4, interlock_loop = 5, crash_sensor = 13, port_of_c = 2;
 constexpr double longest_sleep_us = 100;  ///< the front end and the converter are asked for interrupts so often
 constexpr double least_step_ms = 1e-3;
@@ -109,6 +110,12 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
   observe();
 }
 
+void TruckWorld::fit_clock() {
+  board.rtc = &rtc;
+  board.clock_wakes = [this] { exti.line_edge(ExtiModel::clock_line, true); };
+  board.bus_falls = [this] { exti.pin_edge(port_of_b, can_receive, false); };
+}
+
 // ---- time ----
 
 double TruckWorld::step_ms() const {
@@ -189,7 +196,7 @@ void TruckWorld::update_auxiliary(unsigned pin, double pin_v, double vdda_v) {
 }
 
 void TruckWorld::update_inputs(const plant::PinVoltages& v) {
-  port_c.set_outside(key, false);
+  port_c.set_outside(key, key_on);
   port_c.set_outside(charger_plug, plugged);
   port_c.set_outside(interlock_loop, interlock);
   port_c.set_outside(crash_sensor, !crashed);
@@ -202,7 +209,8 @@ void TruckWorld::update_inputs(const plant::PinVoltages& v) {
 void TruckWorld::observe() {
   const plant::PinVoltages v = truck.pins();
   adc.vdda_v = v.vdda_v;
-  update_supply(v.vdda_v);
+  // REG1 of the front end, the key and the plug each enable the regulator of the controller.
+  update_supply(!chip.in_shutdown() || key_on || plugged ? v.vdda_v : 0);
   update_auxiliary(plus_auxiliary, v.pb14_v, v.vdda_v);
   update_auxiliary(minus_auxiliary, v.pb15_v, v.vdda_v);
   update_inputs(v);
@@ -251,6 +259,7 @@ void TruckWorld::update_supply(double vdda_v) {
 void TruckWorld::update_chip() {
   const plant::PinVoltages v = truck.pins();
   Bq76952Inputs in;
+  in.ts2_low = key_on || plugged;
   in.stack_v = sensors.stack_error_v;
   const std::size_t cells = truck.cell_count();
   for (std::size_t k = 0; k < cells; ++k) {
@@ -357,8 +366,9 @@ std::vector<TruckWorld::Closing> TruckWorld::closings_below_v(double volt, std::
 
 std::vector<std::string> TruckWorld::violations() const {
   std::vector<std::string> all = i2c_.violations();
-  for (const auto* more : {&chip.violations, &board.can.violations, &board.rcc.violations, &board.flash.violations,
-                           &adc.violations, &port_a.violations, &port_b.violations, &port_c.violations}) {
+  for (const auto* more :
+       {&chip.violations, &board.can.violations, &board.rcc.violations, &board.flash.violations, &adc.violations,
+        &port_a.violations, &port_b.violations, &port_c.violations, &rtc.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
   return all;

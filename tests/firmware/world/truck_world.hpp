@@ -89,6 +89,13 @@ class TruckWorld {
     setup_.cell_noise_v = cell_v;
     setup_.shunt_noise_v = shunt_v;
   }
+  /// The 32,768 Hz crystal of the real-time clock, which makes stop mode possible. Before the first step.
+  void fit_clock();
+  /// No other node is on the bus, so nothing is acknowledged; the truck's controller is off.
+  void silence_bus(bool silent) {
+    vehicle.talks = !silent;
+    board.can.others_acknowledge = !silent;
+  }
   /// main() wakes up to `most_ms` late again and again, so samples are that late.
   void make_late(double most_ms) { late_ms_ = most_ms; }
   /// Steps of `step_ms` for the given time, for fast events.
@@ -97,6 +104,8 @@ class TruckWorld {
   bool closed(plant::Relay relay) const { return truck.contact_closed(relay); }
   bool both_mains_closed() const { return closed(plant::Relay::main_plus) && closed(plant::Relay::main_minus); }
   bool any_main_closed() const { return closed(plant::Relay::main_plus) || closed(plant::Relay::main_minus); }
+  /// The controller has no supply, or is in reset.
+  bool off() const { return held_in_reset_; }
   /// The battery can supply no current: one main contact is open, and the precharge relay or the other one.
   bool isolated() const;
   Level pin(plant::Relay relay) const { return port_c.driven(6 + static_cast<unsigned>(relay)); }
@@ -120,10 +129,11 @@ class TruckWorld {
   GpioPort port_a, port_b, port_c;
   ExtiModel exti;
   AdcModel adc;
+  firmware::RtcModel rtc;
   Vehicle vehicle;
   SensorFaults sensors;
   std::function<void()> each_step;
-  bool interlock = true, crashed = false, plugged = false;  ///< levels at PC5, PC13, PC3
+  bool interlock = true, crashed = false, plugged = false, key_on = false;  ///< levels at PC5, PC13, PC3, PC2
   bool aux_fitted = true;  ///< false: the auxiliary contacts are not connected, the pins stay high
 
  private:

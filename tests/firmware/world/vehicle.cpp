@@ -59,7 +59,7 @@ constexpr std::array names{"cell overvoltage warning",
                            "insulation low",
                            "insulation unknown"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
-                        pack_state_id = 0x180, board_id = 0x1B9;
+                        pack_state_id = 0x180, board_id = 0x1B9, inputs_id = 0x1BA;
 constexpr double request_period_ms = 1'000;
 constexpr std::size_t most_seen = 4'096;
 
@@ -129,6 +129,9 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
       break;
     case board_id:
       longest_sample_ms_ = 0.01 * static_cast<double>(field(frame, 48, 16));
+      break;
+    case inputs_id:
+      coils_dead_seen_ = coils_dead_seen_ || field(frame, 22, 2) == 0;
       break;
     default:
       break;

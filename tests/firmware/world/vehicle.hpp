@@ -39,7 +39,12 @@ class Vehicle {
   double silent_ms() const;  ///< since the last Faults message
   /// All faults that were published since the start or since forget().
   std::uint64_t faults_seen() const { return seen_; }
-  void forget() { seen_ = faults_; }
+  /// TruckInputs has said that the coils have no supply, since the start or since forget().
+  bool coils_dead_seen() const { return coils_dead_seen_; }
+  void forget() {
+    seen_ = faults_;
+    coils_dead_seen_ = false;
+  }
 
   struct Change {
     double at_ms;
@@ -62,7 +67,7 @@ class Vehicle {
   Request sent_ = Request::none;
   std::uint64_t faults_ = 0, seen_ = 0;
   unsigned first_cause_ = 0, state_ = 15;
-  bool charge_enabled_ = false;
+  bool charge_enabled_ = false, coils_dead_seen_ = false;
   double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1, longest_sample_ms_ = -1;
   std::vector<Change> changes_;
 };

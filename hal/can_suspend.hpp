@@ -1,0 +1,16 @@
+// The bus over a stop of the chip (hal/sleep.hpp), in which the controller has no clock.
+#pragma once
+
+#include <cstdint>
+
+namespace bms::hal {
+
+/// Takes the controller off the bus, if for quiet_us neither a frame nor an acknowledgement of a node has come.
+/// can_receive() and can_listening() take it on the bus again, where it sends nothing until a frame arrives or a second
+/// has passed.
+bool can_suspend(std::uint64_t quiet_us);
+
+/// A node has begun a frame meanwhile.
+void can_active();
+
+}  // namespace bms::hal

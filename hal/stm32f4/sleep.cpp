@@ -1,0 +1,160 @@
+// Stop mode between two samples (RM0090, 5.3.5): core, PLL and crystal stand still, RAM, registers and the levels of
+// the pins stay. It ends by
+//
+//   the wake-up timer of the real-time clock (26.3.6), in time for the next sample; key and plug are read with it
+//   a falling edge of CAN RX (PB8): its frame is lost, as no node has acknowledged it, its sender repeats it
+//   the supply detector, a lost contact and the coil supply, as always
+//
+// PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230).
+//
+// The real-time clock measures the time asleep, to 1/256 s and without a drift. It needs the 32,768 Hz crystal: without
+// it the chip waits for interrupts instead.
+#include "hal/sleep.hpp"
+
+#include "hal/can_suspend.hpp"
+#include "hal/clock.hpp"
+#include "hal/power.hpp"
+#include "hal/stm32f4/clock_stop.hpp"
+#include "hal/stm32f4/clock_tree.hpp"
+#include "hal/stm32f4/registers.hpp"
+#include "hal/stm32f4/rtc_time.hpp"
+
+namespace bms::hal {
+
+namespace {
+
+using namespace stm32f4;
+
+constexpr std::uint32_t lse_ready = 1U << 1, clock_selected = 3U << 8, from_lse = 1U << 8, rtc_enabled = 1U << 15;
+constexpr std::uint32_t may_be_written = 1U << 2, synchronised = 1U << 5, setting = 1U << 7, timer_flag = 1U << 10,
+                        timer_on = 1U << 10, timer_interrupt = 1U << 14;  // RTC_ISR, RTC_CR
+constexpr std::uint32_t timer_line = 1U << 22, receive_line = 1U << 8;    // EXTI
+constexpr std::uint32_t clock_check = 1U << (tim5_interrupt - 32);
+constexpr std::uint32_t interrupts = 1U << rtc_wakeup_interrupt | 1U << exti9_5_interrupt;
+constexpr std::uint32_t regulator_low = 1U << 0, standby = 1U << 1, flash_off = 1U << 9;  // PWR_CR
+constexpr std::uint32_t deep = 1U << 2;                                                   // SCR
+constexpr std::uint32_t timer_hz = 32'768 / 16, ticks_per_s = 256, ticks_per_day = ticks_per_s * 86'400;
+/// Of the crystal (2 ms, datasheet, HSE oscillator), of the PLL and of the regulator.
+constexpr std::uint64_t start_us = 4'000, shortest_us = 8'000;
+constexpr unsigned max_polls = 20'000;  // 1 ms; the longest wait is two cycles of 32,768 Hz
+
+bool parked = false;
+
+bool clock_runs() {
+  if ((rcc_bdcr() & lse_ready) == 0) return false;
+  if ((rcc_bdcr() & clock_selected) == 0) rcc_bdcr() = rcc_bdcr() | from_lse;
+  if ((rcc_bdcr() & rtc_enabled) == 0) rcc_bdcr() = rcc_bdcr() | rtc_enabled;
+  return (rcc_bdcr() & clock_selected) == from_lse;
+}
+
+bool wait_for(std::uint32_t bit) {
+  for (unsigned k = 0; k < max_polls; ++k) {
+    if ((rtc_isr() & bit) != 0) return true;
+  }
+  return false;
+}
+
+void unlock() {
+  rtc_wpr() = 0xCA;
+  rtc_wpr() = 0x53;
+}
+void lock() { rtc_wpr() = 0xFF; }
+/// Flags are cleared by 0.
+void clear(std::uint32_t flag) { rtc_isr() = ~(flag | setting); }
+
+/// Ticks of the day. The shadow registers are out of date after a stop until they are synchronised.
+std::uint32_t day_ticks() {
+  unlock();
+  clear(synchronised);
+  lock();
+  wait_for(synchronised);
+  const std::uint32_t below = ticks_per_s - 1 - rtc_ssr(), tr = rtc_tr();
+  const std::uint32_t read = rtc_dr();  // frees the shadow registers
+  static_cast<void>(read);
+  const std::uint32_t s =
+      from_digits(tr >> 16 & 0x3F) * 3'600 + from_digits(tr >> 8 & 0x7F) * 60 + from_digits(tr & 0x7F);
+  return s * ticks_per_s + below;
+}
+
+/// Returns false if the timer cannot be set.
+bool start_timer(std::uint32_t counts) {
+  unlock();
+  rtc_cr() = rtc_cr() & ~timer_on;
+  const bool may = wait_for(may_be_written);
+  if (may) {
+    rtc_wutr() = counts - 1;
+    clear(timer_flag);
+    rtc_cr() = timer_on | timer_interrupt;  // 32,768 Hz / 16
+  }
+  lock();
+  return may;
+}
+
+void end_timer() {
+  unlock();
+  rtc_cr() = 0;
+  clear(timer_flag);
+  lock();
+}
+
+/// Interrupts wake the core; their handlers run when the clocks do.
+void stop() {
+  asm volatile("cpsid i" ::: "memory");
+  pause_clock();
+  nvic_icer1() = clock_check;  // on the internal oscillator every measurement is wrong
+  stop_clocks();
+  pwr_cr() = (pwr_cr() & ~standby) | regulator_low | flash_off;
+  scb_scr() = scb_scr() | deep;
+  asm volatile("dsb\n wfi\n isb" ::: "memory");
+  scb_scr() = scb_scr() & ~deep;
+  if (start_clocks().core_hz != crystal_core_hz) finish(1);  // the next start finds out
+  nvic_iser1() = clock_check;
+}
+
+constexpr std::uint32_t only_listens = 1U << 12;  // PB12
+
+void listen() {
+  gpiob_bsrr() = only_listens;
+  gpiob_moder() = (gpiob_moder() & ~(3U << 24)) | 1U << 24;
+  rcc_apb2enr() = rcc_apb2enr() | 1U << 14;           // SYSCFG
+  syscfg_exticr3() = (syscfg_exticr3() & ~15U) | 1U;  // line 8: port B
+  exti_rtsr() = exti_rtsr() | timer_line;
+  exti_ftsr() = exti_ftsr() | receive_line;
+  exti_pr() = timer_line | receive_line;
+  exti_imr() = exti_imr() | timer_line | receive_line;
+  nvic_iser0() = interrupts;
+}
+
+/// Returns true if a node has begun a frame.
+bool end_listening() {
+  const bool began = (exti_pr() & receive_line) != 0;
+  gpiob_bsrr() = only_listens << 16;
+  exti_imr() = exti_imr() & ~(timer_line | receive_line);
+  nvic_icer0() = interrupts;
+  exti_pr() = timer_line | receive_line;
+  nvic_icpr0() = interrupts;
+  return began;
+}
+
+}  // namespace
+
+void set_parked(bool now) { parked = now; }
+
+void rest_until(std::uint64_t due_us) {
+  const std::uint64_t now = now_us();
+  if (!parked || due_us < now + start_us + shortest_us || !clock_runs() || !can_suspend(silence_before_stop_us))
+    return wait_for_interrupt();
+  const std::uint32_t before = day_ticks();
+  if (!start_timer(static_cast<std::uint32_t>((due_us - now - start_us) * timer_hz / 1'000'000)))
+    return wait_for_interrupt();
+  listen();
+  stop();
+  const std::uint32_t ticks = (day_ticks() + ticks_per_day - before) % ticks_per_day;
+  const bool began = end_listening();
+  end_timer();
+  resume_clock(std::uint64_t{ticks} * 1'000'000 / ticks_per_s);
+  asm volatile("cpsie i" ::: "memory");
+  if (began) can_active();
+}
+
+}  // namespace bms::hal

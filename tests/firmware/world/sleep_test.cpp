@@ -1,0 +1,162 @@
+// A parked truck in the circuit's world: how long the chip is stopped, what ends it, and what it does not miss.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include "files/text_file.hpp"
+#include "tests/firmware/world/operating.hpp"
+
+namespace bms::world {
+namespace {
+
+using plant::Relay;
+using ::testing::IsEmpty;
+
+constexpr unsigned pack_state = 0x180;
+constexpr double asleep_share = 0.86;  ///< as the page of the board says
+
+/// Parked, with a silent bus, since so long that the chip stops between the samples.
+class Sleep : public ::testing::Test {
+ protected:
+  Sleep() : pack_(pack_of(6)), world_(pack_.image, typical_setup(pack_)) {
+    world_.fit_clock();
+    world_.run_ms(4'000);  // the crystal of the clock starts
+    EXPECT_EQ(world_.board.stops, 0U) << "the truck's controller talks";
+    world_.silence_bus(true);
+    world_.run_ms(13'000);
+    EXPECT_GT(world_.board.stops, 10U);
+  }
+  ~Sleep() override { EXPECT_THAT(world_.violations(), IsEmpty()); }
+
+  double asleep_of(double ms) {
+    const double before_ms = world_.board.stopped_ms();
+    world_.run_ms(ms);
+    return (world_.board.stopped_ms() - before_ms) / ms;
+  }
+  /// Time until the next sample is on the bus, or a negative value.
+  double sample_after_ms(double within_ms = 3'000) {
+    const unsigned before = world_.vehicle.frames[pack_state];
+    return world_.run_until([&] { return world_.vehicle.frames[pack_state] != before; }, within_ms);
+  }
+
+  Pack pack_;
+  TruckWorld world_;
+};
+
+TEST_F(Sleep, TakesMostOfTheTimeAndLosesNoSample) {
+  const unsigned before = world_.board.estimates;
+  const double share = asleep_of(60'000);
+  fmt::print("asleep {:.1f} % of a minute\n", 100 * share);
+  EXPECT_NEAR(share, asleep_share, 0.01);
+  EXPECT_NEAR(world_.board.estimates - before, 600, 3) << "the clock goes on";
+  const unsigned frames = world_.vehicle.frames[pack_state];
+  world_.run_ms(2'000);
+  EXPECT_EQ(world_.vehicle.frames[pack_state], frames) << "a silent bus stays silent";
+}
+
+TEST_F(Sleep, AFrameOfTheTruckWakesTheBoard) {
+  world_.silence_bus(false);
+  world_.vehicle.request = Request::drive;
+  const double ms = sample_after_ms();
+  fmt::print("first sample on the bus {:.0f} ms after the first frame\n", ms);
+  EXPECT_GE(ms, 0);
+  EXPECT_LT(ms, 1'200) << "the truck repeats its request each second";
+  EXPECT_GT(world_.vehicle.soc_percent(), 0);
+  EXPECT_GE(world_.run_until([&] { return world_.both_mains_closed(); }, start_limit_ms), 0);
+  EXPECT_EQ(world_.vehicle.faults(), 0U);
+  const unsigned stops = world_.board.stops;
+  world_.run_ms(15'000);
+  EXPECT_EQ(world_.board.stops, stops);
+  world_.vehicle.request = Request::none;
+  world_.run_ms(2'000);
+  world_.silence_bus(true);
+  EXPECT_GT(asleep_of(30'000), 0.4) << "and asleep again";
+}
+
+TEST_F(Sleep, ThePlugWakesTheBoard) {
+  world_.plugged = true;
+  world_.board.can.others_acknowledge = true;
+  const double ms = sample_after_ms();
+  fmt::print("first sample on the bus {:.0f} ms after the plug\n", ms);
+  EXPECT_GE(ms, 0);
+  EXPECT_LT(ms, 1'300);
+  const unsigned stops = world_.board.stops;
+  world_.silence_bus(true);
+  world_.run_ms(20'000);
+  EXPECT_LE(world_.board.stops, stops + 1) << "while a charger is plugged";
+}
+
+TEST_F(Sleep, ACellThatRunsDownIsFound) {
+  world_.hold_cell(3, 1.7);
+  world_.run_ms(1'000);
+  EXPECT_GT(asleep_of(5'000), 0.5) << "with a fault as without";
+  world_.silence_bus(false);
+  EXPECT_GE(sample_after_ms(), 0);
+  world_.run_ms(300);
+  EXPECT_TRUE(world_.vehicle.fault(5)) << "cell undervoltage severe";
+  EXPECT_EQ(world_.vehicle.first_cause(), 6U) << "and not that a sample was missing";
+}
+
+TEST_F(Sleep, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
+  world_.hold_cell(7, 2.92);  // just above the release of cell undervoltage
+  world_.run_ms(90'000);
+  EXPECT_FALSE(world_.chip.in_shutdown());
+  world_.hold_cell(7, 2.89);
+  const double off_ms = world_.run_until([&] { return world_.off(); }, 90'000);
+  fmt::print("off after {:.1f} s\n", 1e-3 * off_ms);
+  EXPECT_NEAR(off_ms, 60'000, 1'000);
+  EXPECT_TRUE(world_.chip.in_shutdown());
+  EXPECT_GT(world_.lowest_cell_v(), 2.5) << "long before 1.5 V";
+  world_.run_ms(20'000);
+  EXPECT_TRUE(world_.off());
+  world_.key_on = true;
+  world_.silence_bus(false);
+  const double ms = sample_after_ms(10'000);
+  fmt::print("first sample on the bus {:.0f} ms after the key\n", ms);
+  EXPECT_GE(ms, 0);
+  world_.run_ms(2'000);
+  EXPECT_FALSE(world_.off());
+  EXPECT_EQ(world_.vehicle.faults(), 0U) << "it is empty, and no fault";
+  world_.vehicle.request = Request::charge;
+  EXPECT_GE(world_.run_until([&] { return world_.closed(Relay::charge); }, start_limit_ms), 0) << "it can be charged";
+}
+
+/// Between the threshold of the detector and that of the reset.
+TEST_F(Sleep, ALowSupplyIsNotMissed) {
+  const double low_v = typical_setup(pack_).truck.supply.vdda_v - 2.95;
+  world_.dip_vdda(37, 6'000, low_v);
+  world_.run_ms(1'000);
+  world_.silence_bus(false);
+  EXPECT_GE(sample_after_ms(), 0);
+  world_.run_ms(300);
+  EXPECT_TRUE(world_.vehicle.fault(41)) << "supply dip";
+  EXPECT_THAT(world_.board.resets, IsEmpty());
+}
+
+/// Typical values of the data sheets [mA], and what follows for a pack of 16 cells.
+TEST(Currents, AreThoseOfThePageOfTheBoard) {
+  constexpr double core_runs = 40, core_waits = 12, core_stopped = 0.28, transceiver = 10, transceiver_listens = 0.37,
+                   front_end = 0.286, regulator = 0.0105, off = 0.001 + 0.003, efficiency = 0.8, pack_v = 51.2,
+                   runs = 1 - asleep_share;
+  const auto from_pack = [&](double at_3v3) { return at_3v3 * 3.3 / (pack_v * efficiency) + front_end + regulator; };
+  const double on = from_pack(runs * core_runs + (1 - runs) * core_waits + transceiver),
+               parked = from_pack(runs * core_runs + (1 - runs) * core_stopped + transceiver_listens);
+  constexpr double capacity_ah = 280, empty = 0.011, lost_ma = 1e3 * capacity_ah * 0.02 / 730, hours_a_week = 168;
+  std::string table =
+      "| state | current [mA] | lasts from 10 % [weeks] | the same with what the cells lose [weeks] |\n"
+      "|---|---|---|---|\n";
+  const auto row = [&](const char* state, double ma, double share) {
+    const double charge_mah = 1e3 * capacity_ah * share;
+    table += fmt::format("| {} | {:.2g} | {:.0f} | {:.1f} |\n", state, ma, charge_mah / ma / hours_a_week,
+                         charge_mah / (ma + lost_ma) / hours_a_week);
+  };
+  row("on: the bus is alive, or no crystal", on, 0.1 - empty);
+  row("parked", parked, 0.1 - empty);
+  row("off, from an empty cell on", off, empty);
+  const std::string page = files::read_file(BMS_SOURCE_DIR "/boards/stm32f405_forklift/README.md");
+  EXPECT_NE(page.find(table), std::string::npos) << table;
+}
+
+}  // namespace
+}  // namespace bms::world
