@@ -10,6 +10,7 @@
 
 #include "files/cell_file.hpp"
 #include "identification/joint_structure.hpp"
+#include "identification/variance_parts.hpp"
 #include "plant/truth_cell.hpp"
 #include "tests/inference/identification/plant.hpp"
 
