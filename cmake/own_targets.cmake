@@ -12,7 +12,9 @@ foreach(group firmware host_sim inference evidence)
 endforeach()
 
 add_library(bms_warnings INTERFACE)
-target_compile_options(bms_warnings INTERFACE -Wall -Wextra -Wshadow -Wconversion)
+# In a unit of several sources a name may hide one of another source (bms_unity_build).
+target_compile_options(bms_warnings INTERFACE -Wall -Wextra -Wconversion
+  $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>)
 
 # bms_own_targets(FOLDER): call it after all targets are defined
 function(bms_own_targets folder)

@@ -53,7 +53,7 @@ class Sdo : public ::testing::Test {
     return answer({0x40, static_cast<std::uint8_t>(index), static_cast<std::uint8_t>(index >> 8), 0});
   }
   static std::uint32_t code(const can::Frame& f) {
-    return f.data[4] | f.data[5] << 8U | f.data[6] << 16U | static_cast<std::uint32_t>(f.data[7]) << 24U;
+    return f.data[4] | std::uint32_t{f.data[5]} << 8 | std::uint32_t{f.data[6]} << 16 | std::uint32_t{f.data[7]} << 24;
   }
   /// The whole text, as a client reads it; nothing if the server aborts.
   std::optional<std::string> text(std::uint16_t index) {
