@@ -43,7 +43,7 @@ CLEAN = {
     DIAGNOSE: '#include "files/cell_file.hpp"\n\ndouble half(double x) { return 0.5 * x; }\n',
     "README.md": "The residual is not significant.\n",
     "tests/long.txt": "# Long.\nCell.IsRight 20 slow\n",
-    "tests/cell_test.cpp": "TEST(Cell, IsRight) {}\n",
+    "tests/cell_test.cpp": "TEST(Cell, IsRight) {}\nTEST(Cell, IsLong) {}\n",
 }
 SAFETY_CLEAN = {
     "firmware/protection/faults.hpp": "enum class Fault { hot, cold };  // not: warm\n",
@@ -127,6 +127,8 @@ BREACHES = [  # check, file, what is added to it, what the check must say
     ("words", "model/cell.hpp", "void know_anew(int state);\n", "model/cell.hpp:3: know_anew ->"),
     ("words", DIAGNOSE, 'auto text = "a fault beside it";\n', "diagnose.cpp:4: beside ->"),
     ("long_tests", "tests/long.txt", "Cell.IsWrong 20 slow\n", "tests/long.txt:3: no test is called Cell.IsWrong"),
+    ("long_tests", "tests/long.txt", "Cell.IsLong 20 Cell.IsRight is one\n",
+     "tests/long.txt:3: what stands for Cell.IsLong is long itself"),
     ("words", "README.md", "For who builds a truck.\n", "README.md:2: For who ->"),
     ("format", DIAGNOSE, "int  badly( int x ){return x ;}\n", "diagnose.cpp:4:"),
     ("format", "host_sim/reports/page/new.js", "const x = {a:1};\n", "host_sim/reports/page/new.js:1:"),
