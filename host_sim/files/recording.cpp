@@ -21,7 +21,6 @@ using measurement::Recording;
 
 namespace {
 
-constexpr double largest_soc = 1.05;        ///< of a reference that counts charge with a small error
 constexpr double largest_cell_v = 5.5;      ///< of a lithium cell, with a margin
 constexpr double usual_cell_v = 3.3;        ///< to estimate the number of cells
 constexpr double least_millivolts = 1'000;  ///< a median voltage that only makes sense in millivolts
@@ -36,7 +35,7 @@ std::string impossible(const Recording& r) {
     return fmt::format("soc_ref reaches {:g}: it looks like {}, expected a fraction from 0 to 1: --unit soc_ref={}",
                        soc, fine ? "ten thousandths of a percent" : "percent", fine ? "ppm" : "%");
   }
-  if (soc > largest_soc) {
+  if (soc > largest_soc_ref) {
     return fmt::format(
         "soc_ref reaches {:g}: the capacity or the start of its counting is wrong, expected a fraction "
         "from 0 to 1",

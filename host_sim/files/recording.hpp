@@ -22,6 +22,9 @@
 
 namespace bms::files {
 
+/// The largest soc_ref of a recording: that of a reference that counts charge with a small error.
+inline constexpr double largest_soc_ref = 1.05;
+
 /// A profile has no voltage: it is a current to apply to a cell.
 enum class VoltageColumn { required, optional };
 

@@ -216,9 +216,9 @@ std::string csv_of(const SimulateOptions& options, const SimulationRun& run) {
     for (const SimulatedCell& cell : run.cells)
       fmt::format_to(std::back_inserter(csv), ",{:.10g}", cell.voltage_v[k] + options.noise_v * noise.next());
     if (run.interval) fmt::format_to(std::back_inserter(csv), ",{:.4g}", run.interval->sigma_v[k]);
-    // a mechanism or a start may lead beyond full: no command accepts that as a reference
+    // a mechanism or a start may lead further beyond full: no command accepts that as a reference
     const double soc = run.rows[k].soc;
-    csv += soc >= 0 && soc <= 1 ? fmt::format(",{:.10g}\n", soc) : ",\n";
+    csv += soc <= files::largest_soc_ref ? fmt::format(",{:.10g}\n", soc) : ",\n";
   }
   return csv;
 }
