@@ -5,6 +5,7 @@
 
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
+#include "hal/sleep.hpp"
 
 namespace bms {
 
@@ -41,6 +42,7 @@ bool i2c_recover() { return chip->recover(); }
 void i2c_start() {}
 std::uint64_t now_us() { return chip->time_us; }
 void wait_for_interrupt() { chip->advance(1'000 - chip->time_us % 1'000); }
+void rest_until(std::uint64_t) { wait_for_interrupt(); }
 bool can_receive(can::Frame& frame) {
   if (arriving.empty()) return false;
   frame = arriving.front();
