@@ -29,6 +29,8 @@
 #                  "heater fan soc_lamp"; also as -DBMS_INPUTS="coil_supply;crash"
 #   BMS_INSULATION  monitor: absent, pwm (PA6) or iso175 (CAN)
 #   BMS_SECOND_CURRENT  hall (PA1), or absent
+#   BMS_SWITCHES_OFF  true: an empty battery that nobody uses, or one of a workshop's command, switches itself off
+#                  (firmware/shelf.hpp); needs the input key, and the wiring of the board's page, or nothing wakes it
 #   BMS_CLOSES_BY_INPUTS  true: key and charger plug close the contactors without authority (docs/safety/threats.md)
 #
 # BMS_VEHICLE_PROFILE adds messages for other makers' devices (firmware/can/messages.md): cia418 for a CANopen charger,
@@ -46,7 +48,7 @@
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
-set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS)
+set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SWITCHES_OFF)
 foreach(value ${of_pack_and_truck} ${of_inputs})
   if(DEFINED BMS_${value})
     set(wanted_${value} "${BMS_${value}}")  # OFF and an empty list are wishes, too
@@ -76,6 +78,14 @@ list(REMOVE_ITEM BMS_OUTPUTS none)
 set(may_stop false)
 if(BMS_SAMPLES STREQUAL "bq76952")
   set(may_stop true)
+endif()
+set(switches_off false)
+if(BMS_SWITCHES_OFF)
+  if(NOT may_stop OR NOT "key" IN_LIST BMS_INPUTS)
+    message(FATAL_ERROR "BMS_SWITCHES_OFF needs BMS_SAMPLES bq76952 and key among BMS_INPUTS: without a key that is "
+      "read, a battery that is being used switches itself off")
+  endif()
+  set(switches_off true)
 endif()
 set(truck_side false)
 if(BMS_INPUTS OR second_current_possible OR NOT BMS_INSULATION STREQUAL "absent")
@@ -311,7 +321,7 @@ bms_objects(application -Os ${root}/firmware/main.cpp ${root}/firmware/board_cel
 bms_objects(estimator_step -O2 ${root}/firmware/estimator_step.cpp ${generated_headers})
 foreach(objects application estimator_step)
   target_compile_definitions(${objects} PRIVATE BMS_IN_SLOT=${in_slot} BMS_MAY_STOP=${may_stop}
-    BMS_BOARD="${BMS_BOARD}")
+    BMS_SWITCHES_OFF=${switches_off} BMS_BOARD="${BMS_BOARD}")
 endforeach()
 math(EXPR version "(${PROJECT_VERSION_MAJOR} << 16) + (${PROJECT_VERSION_MINOR} << 8) + ${PROJECT_VERSION_PATCH}"
   OUTPUT_FORMAT HEXADECIMAL)

@@ -381,7 +381,7 @@ class Application {
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
   float capacity_ah_ = 0;
-  TruckSide truck_;
+  TruckSide<may_switch_off<Board>> truck_;
   Commands commands_;
   struct NoParameters {};
   [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;

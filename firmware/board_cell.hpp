@@ -54,6 +54,7 @@ struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_
   using Estimator = BoardEstimator;
   static constexpr std::size_t cells = hal::pack_cells;
   static constexpr bool may_stop = BMS_MAY_STOP;  ///< between samples, while the battery is parked (hal/sleep.hpp)
+  static constexpr bool switches_off = BMS_SWITCHES_OFF;  ///< by itself and by a command (firmware/shelf.hpp)
 
   static Estimator::Result step(Estimator& estimator, const measurement::Sample& sample) {
     return estimator_step(estimator, sample);

@@ -101,6 +101,7 @@ class Node {
     const std::uint8_t command = request.data[0] >> 5, sub = request.data[3];
     if (command == upload_segment) return send_segment(request);
     rest_ = {};  // a new transfer ends the one before
+    std::copy_n(request.data.begin() + 1, object_.size(), object_.begin());
     if (command == abort) return;
     can::Frame answer{sdo_answer_id + id_, 8, {0, request.data[1], request.data[2], sub}};
     AbortCode abort_code = AbortCode::unknown_command;
@@ -130,6 +131,7 @@ class Node {
     can::Frame answer{sdo_answer_id + id_, 8, {}};
     if (rest_.empty() || (request.data[0] & 0x10) != toggle_) {
       make_abort(answer, rest_.empty() ? AbortCode::unknown_command : AbortCode::toggle_not_alternated);
+      std::ranges::copy(object_, answer.data.begin() + 1);
       rest_ = {};
     } else {
       const std::size_t sent = std::min<std::size_t>(rest_.size(), 7);
@@ -144,7 +146,8 @@ class Node {
   Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
-  std::string_view rest_{};  ///< of a text that is read
+  std::string_view rest_{};               ///< of a text that is read
+  std::array<std::uint8_t, 3> object_{};  ///< index and subindex of the last transfer
   std::uint8_t toggle_ = 0;
 };
 

@@ -41,13 +41,18 @@ class Address {
 
   constexpr std::uint8_t value() const { return address_; }
 
-  /// Call at each sample. Returns true if messages may be sent from value().
+  /// Call at each sample. Returns true if messages may be sent from value(). A claim that could not be sent is
+  /// repeated.
   bool update(std::uint64_t now_us) {
-    if (!began_) {
-      began_ = true;
-      send(now_us);
-    }
-    return address_ != null && now_us - sent_us_ >= contention_us;
+    if (!began_) send(now_us);
+    return began_ && address_ != null && now_us - sent_us_ >= contention_us;
+  }
+
+  /// Call while nobody listens. Others may have claimed the address meanwhile, so it is claimed again afterwards.
+  void stop() {
+    began_ = false;
+    moves_ = 0;
+    if (address_ == null) address_ = first;
   }
 
   void receive(const can::Frame& frame, std::uint64_t now_us) {
@@ -69,11 +74,13 @@ class Address {
   }
 
  private:
-  void answer() const {
+  /// Returns false if it cannot be sent.
+  bool claim() const {
     can::Frame frame{claimed | address_, 8, {}, true};
     hal::put_bytes(frame.data, 0, name_);
-    hal::can_send(frame);
+    return hal::can_send(frame);
   }
+  void answer() { began_ = claim(); }
   void send(std::uint64_t now_us) {
     sent_us_ = now_us;
     answer();

@@ -114,7 +114,7 @@ class J1939Profile {
   /// Sends the messages that are due.
   template <class Estimator, std::size_t Cells>
   void publish(const Snapshot<Estimator, Cells>& now) {
-    if (!hal::can_listening()) return;
+    if (!hal::can_listening()) return address_.stop();
     now_us_ = static_cast<std::uint32_t>(now.pack.time_us);
     if (!address_.update(now.pack.time_us)) return;
     send_if_due<j1939::DcSourceStatus1>([&] { return j1939::status_1(now); });

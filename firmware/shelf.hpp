@@ -5,7 +5,12 @@
 //
 // A workshop's command (ship mode) does the same two seconds later, on any bus and with any voltage.
 //
-// The driver's key or the charger's plug switches it on again. Unless it is charged, the minute begins again.
+// The driver's key or the charger's plug switches it on again. While its supply does not fall, the minute begins again.
+//
+// Only in a build with BMS_SWITCHES_OFF, because it takes a wiring that no firmware can check: without REG1 of the
+// front end in the supply the core goes on without readings, and without TS2 at key and plug nothing ends SHUTDOWN. If
+// TS2 is low or LD high at the command, the BQ76952 waits, with its outputs off, until both have ended; the model of
+// the chip (tests/hal/bq76952_model.hpp) does not have this.
 #pragma once
 
 #include <cstdint>
@@ -20,28 +25,32 @@ class Shelf {
 
   static constexpr std::uint64_t answer_us = 2'000'000;  ///< of the command
 
-  /// The battery is to be switched off, unless it is used before.
-  constexpr void ship() {
+  /// The battery is to be switched off, unless it is used before. Returns false if it is used now.
+  [[nodiscard]] constexpr bool ship() {
+    if (used_) return false;
     shipping_ = true;
     counting_ = false;
+    return true;
   }
 
-  /// Returns true if the battery is to be switched off now. used: a contactor, a request, a charger or the key; silent:
-  /// the bus.
+  /// Returns true if the battery is to be switched off now. used: anything but rest with open contactors; silent: the
+  /// bus.
   constexpr bool update(std::int32_t lowest_cell_uv, std::int32_t empty_uv, bool used, bool silent,
                         std::uint64_t now_us) {
+    used_ = used;
     shipping_ = shipping_ && !used;
     const bool low = !used && silent && lowest_cell_uv != measurement::no_reading && lowest_cell_uv < empty_uv;
     if (!counting_) since_us_ = now_us;
     counting_ = low || shipping_;
     if (!counting_ || now_us - since_us_ < (shipping_ ? answer_us : low_for_us)) return false;
     shipping_ = false;
+    since_us_ = now_us;
     return true;
   }
 
  private:
   std::uint64_t since_us_ = 0;
-  bool counting_ = false, shipping_ = false;
+  bool counting_ = false, shipping_ = false, used_ = true;
 };
 
 }  // namespace bms::firmware

@@ -5,6 +5,7 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <type_traits>
 
 #include "firmware/commands.hpp"
 #include "firmware/current_referee.hpp"
@@ -17,6 +18,14 @@
 
 namespace bms::firmware {
 
+/// Board::switches_off: build option BMS_SWITCHES_OFF (firmware/shelf.hpp).
+template <class Board>
+inline constexpr bool may_switch_off = requires {
+  requires Board::switches_off;
+};
+
+/// SwitchesOff: may_switch_off of the board.
+template <bool SwitchesOff>
 class TruckSide {
  public:
   /// Call once per sample. fitted: bits of parameters::Parameter::inputs_fitted.
@@ -65,32 +74,44 @@ class TruckSide {
   std::optional<std::uint32_t> command(const can::Command& command, bool closed, May&& may) {
     using A = can::CommandAnswer;
     if (command.code != can::Command::code_switch_off) return std::nullopt;
+    if constexpr (!SwitchesOff) return A::result_refused;
     if (command.argument != 0) return A::result_refused;
     if (!may(Privilege::service)) return A::result_not_authorised;
-    if (closed) return A::result_refused;
-    shelf_.ship();
-    return A::result_done;
+    return !closed && shelf_.ship() ? A::result_done : A::result_refused;
   }
 
-  /// The battery rests between samples while nobody uses it. An insulation monitor that measures is being used. Returns
-  /// true if it is to be switched off (firmware/shelf.hpp).
+  /// The battery rests between samples while nobody uses it; an insulation monitor that measures is being used. Returns
+  /// true if it is to be switched off (firmware/shelf.hpp), which the monitor does not prevent. A contactor that is not
+  /// proven open, by its contact, a weld or the current, does.
   template <std::size_t Cells>
   bool park(const measurement::PackSample<Cells>& pack, const protection::ExternalInputs& inputs,
             const ChargerState& charger, const protection::Decision& decision, const BoardStatus& board,
             const protection::ProtectionPlan& plan) {
-    const bool used = inputs.request != protection::Request::none || charger.present || decision.outputs.any_closed() ||
-                      board.truck.is_on(hal::TruckInput::key) || board.insulation.ohm != measurement::no_reading;
-    hal::set_parked(!used);
-    const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
-    return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release, used,
-                         !hal::can_listening(), pack.time_us);
+    const bool wanted = inputs.request != protection::Request::none || charger.present ||
+                        decision.outputs.any_closed() || board.truck.is_on(hal::TruckInput::key);
+    hal::set_parked(!wanted && board.insulation.ohm == measurement::no_reading);
+    if constexpr (!SwitchesOff) {
+      return false;
+    } else {
+      const std::int32_t rest_ua = plan.contactors.rest_ua;
+      const bool rests =
+          pack.current_ua != measurement::no_reading && pack.current_ua <= rest_ua && pack.current_ua >= -rest_ua;
+      const bool closed = decision.welded_pole != protection::Pole::none || inputs.auxiliary.main_plus_closed ||
+                          inputs.auxiliary.main_minus_closed;
+      const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
+      return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release,
+                           wanted || !rests || closed, !hal::can_listening(), pack.time_us);
+    }
   }
 
  private:
   InsulationMonitor<hal::insulation_monitor> insulation_;
   TruckOutputs outputs_;
   CurrentReferee referee_;
-  Shelf shelf_;
+  struct Never {
+    bool ship() const { return false; }
+  };
+  [[no_unique_address]] std::conditional_t<SwitchesOff, Shelf, Never> shelf_;
 };
 
 }  // namespace bms::firmware

@@ -14,8 +14,9 @@ inline constexpr std::uint64_t silence_before_stop_us = 10'000'000;
 /// Call once per sample. parked: all contactors are open, and nobody asks for power.
 void set_parked(bool parked);
 
-/// Switches the measuring chip off and with it the supply of this core, unless key or plug keep it on. The stored state
-/// is complete before. Returns, because the supply does not fall at once.
+/// Switches the measuring chip off, and with it the supply of this core where it is wired so, unless key or plug keep
+/// it on. Only of a build with BMS_SWITCHES_OFF (firmware/shelf.hpp). The stored state is complete before. Returns,
+/// because the supply does not fall at once.
 void switch_off();
 
 /// Returns with the next interrupt, at the latest at due_us [us, hal::now_us()].

@@ -34,12 +34,13 @@ std::uint64_t now_us() {
   }
 }
 
-void stm32f4::pause_clock() {
+std::uint64_t stm32f4::pause_clock() {
   resumed_us = now_us();
   syst_csr() = 0;
   scb_icsr() = 1U << 25;  // no tick is pending
   milliseconds_low = 0;
   milliseconds_high = 0;
+  return resumed_us;
 }
 
 void stm32f4::resume_clock(std::uint64_t stopped_us) {

@@ -5,8 +5,8 @@
 
 namespace bms::hal::stm32f4 {
 
-/// SysTick and the supervision of the clock stand still from now on.
-void pause_clock();
+/// SysTick and the supervision of the clock stand still from now on. Returns hal::now_us() of now.
+std::uint64_t pause_clock();
 
 /// They go on. stopped_us: time since pause_clock().
 void resume_clock(std::uint64_t stopped_us);

@@ -7,9 +7,11 @@
 //
 // PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230).
 //
-// The real-time clock measures the time asleep, to 1/256 s and without a drift. It needs the 32,768 Hz crystal: without
-// it the chip waits for interrupts instead.
+// The real-time clock measures the time asleep, to 1/256 s. It needs the 32,768 Hz crystal: without it, or if it dies
+// later, which its ready flag does not show, the chip waits for interrupts instead.
 #include "hal/sleep.hpp"
+
+#include <optional>
 
 #include "hal/can_suspend.hpp"
 #include "hal/clock.hpp"
@@ -33,12 +35,13 @@ constexpr std::uint32_t clock_check = 1U << (tim5_interrupt - 32);
 constexpr std::uint32_t interrupts = 1U << rtc_wakeup_interrupt | 1U << exti9_5_interrupt;
 constexpr std::uint32_t regulator_low = 1U << 0, standby = 1U << 1, flash_off = 1U << 9;  // PWR_CR
 constexpr std::uint32_t deep = 1U << 2;                                                   // SCR
+constexpr std::uint32_t converter_on = 1U << 0;  // ADC_CR2; it needs 3 us, start_clocks() takes 2 ms
 constexpr std::uint32_t timer_hz = 32'768 / 16, ticks_per_s = 256, ticks_per_day = ticks_per_s * 86'400;
 /// Of the crystal (2 ms, datasheet, HSE oscillator), of the PLL and of the regulator.
 constexpr std::uint64_t start_us = 4'000, shortest_us = 8'000;
 constexpr unsigned max_polls = 20'000;  // 1 ms; the longest wait is two cycles of 32,768 Hz
 
-bool parked = false;
+bool parked = false, clock_died = false;
 
 bool clock_runs() {
   if ((rcc_bdcr() & lse_ready) == 0) return false;
@@ -62,12 +65,13 @@ void lock() { rtc_wpr() = 0xFF; }
 /// Flags are cleared by 0.
 void clear(std::uint32_t flag) { rtc_isr() = ~(flag | setting); }
 
-/// Ticks of the day. The shadow registers are out of date after a stop until they are synchronised.
-std::uint32_t day_ticks() {
+/// Ticks of the day. The shadow registers are out of date after a stop until they are synchronised, which a clock that
+/// stands still never does.
+std::optional<std::uint32_t> day_ticks() {
   unlock();
   clear(synchronised);
   lock();
-  wait_for(synchronised);
+  if (!wait_for(synchronised)) return std::nullopt;
   const std::uint32_t below = ticks_per_s - 1 - rtc_ssr(), tr = rtc_tr();
   const std::uint32_t read = rtc_dr();  // frees the shadow registers
   static_cast<void>(read);
@@ -97,18 +101,21 @@ void end_timer() {
   lock();
 }
 
-/// Interrupts wake the core; their handlers run when the clocks do.
-void stop() {
+/// Interrupts wake the core; their handlers run when the clocks do. Returns the time at which the clock stopped.
+std::uint64_t stop() {
   asm volatile("cpsid i" ::: "memory");
-  pause_clock();
+  const std::uint64_t stopped_us = pause_clock();
   nvic_icer1() = clock_check;  // on the internal oscillator every measurement is wrong
   stop_clocks();
+  adc1_cr2() = 0;  // the converter goes on needing its current otherwise (RM0090, 5.3.5)
   pwr_cr() = (pwr_cr() & ~standby) | regulator_low | flash_off;
   scb_scr() = scb_scr() | deep;
   asm volatile("dsb\n wfi\n isb" ::: "memory");
   scb_scr() = scb_scr() & ~deep;
+  adc1_cr2() = converter_on;
   if (start_clocks().core_hz != crystal_core_hz) finish(1);  // the next start finds out
   nvic_iser1() = clock_check;
+  return stopped_us;
 }
 
 constexpr std::uint32_t only_listens = 1U << 12;  // PB12
@@ -142,17 +149,23 @@ void set_parked(bool now) { parked = now; }
 
 void rest_until(std::uint64_t due_us) {
   const std::uint64_t now = now_us();
-  if (!parked || due_us < now + start_us + shortest_us || !clock_runs() || !can_suspend(silence_before_stop_us))
+  if (!parked || clock_died || due_us < now + start_us + shortest_us || !clock_runs() ||
+      !can_suspend(silence_before_stop_us))
     return wait_for_interrupt();
-  const std::uint32_t before = day_ticks();
-  if (!start_timer(static_cast<std::uint32_t>((due_us - now - start_us) * timer_hz / 1'000'000)))
+  const auto before = day_ticks();
+  const std::uint64_t before_us = now_us();
+  if (!before || !start_timer(static_cast<std::uint32_t>((due_us - now - start_us) * timer_hz / 1'000'000))) {
+    clock_died = true;  // or the controller would leave the bus again and again
     return wait_for_interrupt();
+  }
   listen();
-  stop();
-  const std::uint32_t ticks = (day_ticks() + ticks_per_day - before) % ticks_per_day;
+  const std::uint64_t awake_us = stop() - before_us;  // in both clocks
+  const auto after = day_ticks();
+  const std::uint32_t ticks = after ? (*after + ticks_per_day - *before) % ticks_per_day : 0;
   const bool began = end_listening();
   end_timer();
-  resume_clock(std::uint64_t{ticks} * 1'000'000 / ticks_per_s);
+  const std::uint64_t since_us = std::uint64_t{ticks} * 1'000'000 / ticks_per_s;
+  resume_clock(since_us > awake_us ? since_us - awake_us : 0);
   asm volatile("cpsie i" ::: "memory");
   if (began) can_active();
 }

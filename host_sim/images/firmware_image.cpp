@@ -15,6 +15,7 @@
 #include "files/bad_input.hpp"
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
+#include "images/chosen_image.hpp"
 
 namespace bms::images {
 
@@ -114,10 +115,11 @@ void check_cells(const std::string& board, std::size_t cells, const std::filesys
 struct Variant {
   std::string board, vehicle_profile;
   std::size_t cells;  ///< 0: the board's own number
+  Choice choice{};
 
   std::string ending() const {
     return (vehicle_profile == "none" ? "" : "-" + vehicle_profile) +
-           (cells == 0 ? "" : fmt::format("-{}cells", cells));
+           (cells == 0 ? "" : fmt::format("-{}cells", cells)) + (choice.name.empty() ? "" : "-" + choice.name);
   }
 };
 
@@ -144,7 +146,9 @@ class BuildFolder {
                                           (sources_.folder / "cmake" / "toolchain-arm-none-eabi.cmake").string(),
                                           "-DBMS_CELL_HEADER_TOOL=" + sources_.cell_header_tool};
     if (variant.cells != 0) configure.push_back(fmt::format("-DBMS_CELLS={}", variant.cells));
-    configure.insert(configure.end(), options.begin(), options.end());
+    for (const auto* more : {&variant.choice.options, &options}) {
+      configure.insert(configure.end(), more->begin(), more->end());
+    }
     run_step(configure, log());
   }
 
@@ -164,6 +168,28 @@ std::filesystem::path shared_objects(const SourceTree& sources, const Variant& v
   if (folder.is_new()) folder.configure(variant, {});
   folder.build(image_name + "_shared");
   return folder.path();
+}
+
+std::filesystem::path build(const SourceTree& sources, const Variant& variant, const files::CellFile& cell,
+                            Image image) {
+  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
+    if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
+  }
+  const std::string image_name = fmt::format("bms_{}{}", variant.board, ending(image));
+  const auto shared = shared_objects(sources, variant, image_name);
+  const std::string slot = slot_of(image);
+  const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}{}", variant.board, cell.name, cell.hash,
+                                                variant.ending(), slot.empty() ? "" : "-slot_" + slot));
+  const auto cell_path = folder.path() / "cell.toml";
+  if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
+    files::write_file(cell_path, cell.text);
+  if (folder.is_new()) {
+    if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", variant.board, cell.name);
+    folder.configure(
+        variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(), "-DBMS_SLOT=" + slot});
+  }
+  folder.build(image_name + ".elf");
+  return folder.path() / (image_name + ".elf");
 }
 
 }  // namespace
@@ -197,25 +223,13 @@ std::filesystem::path firmware_image(const SourceTree& sources, const std::strin
   const auto file = board_file(board, sources);
   const bool other_cells = cells != 0 && cells != std::stoul(setting_of(file, "BMS_CELLS"));
   if (other_cells) check_cells(board, cells, file);
-  for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
-    if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
-  }
-  const Variant variant{board, vehicle_profile, other_cells ? cells : 0};
-  const std::string image_name = fmt::format("bms_{}{}", board, ending(image));
-  const auto shared = shared_objects(sources, variant, image_name);
-  const std::string slot = slot_of(image);
-  const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}{}", board, cell.name, cell.hash, variant.ending(),
-                                                slot.empty() ? "" : "-slot_" + slot));
-  const auto cell_path = folder.path() / "cell.toml";
-  if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
-    files::write_file(cell_path, cell.text);
-  if (folder.is_new()) {
-    if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", board, cell.name);
-    folder.configure(
-        variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(), "-DBMS_SLOT=" + slot});
-  }
-  folder.build(image_name + ".elf");
-  return folder.path() / (image_name + ".elf");
+  return build(sources, {board, vehicle_profile, other_cells ? cells : 0}, cell, image);
+}
+
+std::filesystem::path chosen_image(const std::string& board, const files::CellFile& cell, const Choice& choice) {
+  const SourceTree& sources = present_sources();
+  board_file(board, sources);
+  return build(sources, {board, "none", 0, choice}, cell, Image::application);
 }
 
 }  // namespace bms::images

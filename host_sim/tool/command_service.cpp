@@ -60,7 +60,7 @@ class ServiceCommand final : public Command {
     c.add_option(
          "command", o_.what,
          "clear-faults; clear-latched: also those that only a workshop clears; set-time; switch-off: for transport "
-         "and storage, until key or plug; voltage-gain, "
+         "and storage, until key or plug, refused by a board without BMS_SWITCHES_OFF; voltage-gain, "
          "current-gain [ppm]; voltage-offset [uV], current-offset [uA]")
         ->required()
         ->check(CLI::IsMember(commands()));

@@ -18,6 +18,7 @@ using Bytes = Link::Bytes;
 
 constexpr std::size_t piece_bytes = 1'024;
 constexpr int most_tries = 5;
+constexpr std::size_t earliest_state_bytes = 24;          // without the time since the start
 constexpr std::chrono::seconds longest_until_restart{3};  // a sample, and the state that is stored before
 constexpr std::uint8_t negative = 0x7F, pending = 0x78;
 
@@ -71,8 +72,7 @@ class Update {
   UpdateResult run() {
     const auto begin = Clock::now();
     try {
-      auto before = read_state(link_);
-      for (int tries = 1; !before && tries < most_tries; ++tries) before = read_state(link_);  // it may be starting
+      const auto before = read_until_answered();  // it may be starting
       if (!before) throw Refused{"no battery answers, or it has no boot loader"};
       state_ = *before;
       result_.from = version_text(state_.version);
@@ -180,17 +180,28 @@ class Update {
     expect({0x31, 0x01, 0xFF, 0x01}, 10'000);
   }
 
+  std::optional<BatteryState> read_until_answered() {
+    auto state = read_state(link_);
+    for (int tries = 1; !state && tries < most_tries; ++tries) state = read_state(link_);
+    return state;
+  }
+
   /// Restarts the battery and reads what runs until the trial is over. A battery may answer before it restarts, and a
-  /// drive that begins then keeps it from restarting: only a time since its start that went back shows the next one.
+  /// drive that begins then keeps it from restarting: only a time since its start that went back shows the next one. Of
+  /// a battery that does not state it another slot, a trial or a return shows it.
   void restart() {
-    const auto before = read_state(link_);
+    const auto before = read_until_answered();
+    if (!before) throw Refused{"the battery does not answer any more; send again, the transfer resumes"};
     expect({0x11, 0x01});
     const auto begin = Clock::now();
     const auto end = begin + std::chrono::duration<double>(wish_.start_wait_s);
-    bool restarted = !before;
-    for (std::uint32_t up_ms = before ? before->up_ms : 0; Clock::now() < end;) {
+    const auto differs = [&](const BatteryState& now) {
+      return now.running != before->running || now.trial != before->trial || now.returned != before->returned;
+    };
+    bool restarted = false;
+    for (auto up_ms = before->up_ms; Clock::now() < end;) {
       const auto now = read_state(link_);
-      restarted = restarted || (now && now->up_ms < up_ms);
+      restarted = restarted || (now && (up_ms && now->up_ms ? *now->up_ms < *up_ms : differs(*now)));
       if (now) up_ms = now->up_ms;
       if (now && !restarted && Clock::now() - begin > longest_until_restart)
         throw Refused{"the battery has not restarted: the image is complete and starts at its next restart"};
@@ -267,7 +278,7 @@ std::optional<BatteryState> read_state(Link& link) {
   const auto board = link.request({0x22, 0xF1, 0xA0});
   if (!board || board->size() < 4 || (*board)[0] != 0x62) return std::nullopt;
   const auto state = link.request({0x22, 0xF1, 0xA1});
-  if (!state || state->size() != 3 + boot::state_record_bytes || (*state)[0] != 0x62) return std::nullopt;
+  if (!state || state->size() < 3 + earliest_state_bytes || (*state)[0] != 0x62) return std::nullopt;
   BatteryState s;
   s.board.assign(board->begin() + 3, board->end());
   if ((*state)[3] < 2) s.running = (*state)[3];
@@ -280,7 +291,7 @@ std::optional<BatteryState> read_state(Link& link) {
   s.received = big(*state, 22, 4);
   s.development_image = ((*state)[26] & 1) != 0;
   s.accepts_development = ((*state)[26] & 2) != 0;
-  s.up_ms = big(*state, 27, 4);
+  if (state->size() >= 3 + boot::state_record_bytes) s.up_ms = big(*state, 27, 4);
   return s;
 }
 

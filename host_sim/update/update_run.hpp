@@ -41,7 +41,7 @@ struct BatteryState {
   bool trial = false, returned = false;
   bool development_image = false, accepts_development = false;
   std::uint32_t version = 0, cell_hash = 0, security_counter = 0, loader = 0, received = 0;
-  std::uint32_t up_ms = 0;  ///< time since its start
+  std::optional<std::uint32_t> up_ms;  ///< time since its start; an earlier update server does not state it
 };
 
 struct UpdateWish {

@@ -83,7 +83,10 @@ TEST_F(Sdo, ReadsTextsOfEveryLengthInSegments) {
 TEST_F(Sdo, RefusesASegmentWithoutATransferOrWithTheWrongToggle) {
   EXPECT_EQ(code(answer({0x60})), 0x05040001U);
   EXPECT_EQ(begin(0x2014).data[0], 0x41);
-  EXPECT_EQ(code(answer({0x70})), 0x05030000U);
+  const can::Frame refused = answer({0x70});
+  EXPECT_EQ(code(refused), 0x05030000U);
+  EXPECT_EQ(refused.data[0], 0x80);
+  EXPECT_EQ(refused.data[1] | refused.data[2] << 8 | refused.data[3] << 16, 0x2014) << "the transfer that it ends";
   EXPECT_EQ(code(answer({0x60})), 0x05040001U) << "the transfer has ended";
   EXPECT_EQ(begin(0x2014).data[0], 0x41);
   answer({0x60});

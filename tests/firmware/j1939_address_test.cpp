@@ -9,8 +9,10 @@ namespace bms::hal {
 
 namespace {
 std::deque<can::Frame> sent;
-}
+bool full = false;
+}  // namespace
 bool can_send(const can::Frame& frame) {
+  if (full) return false;
   sent.push_back(frame);
   return true;
 }
@@ -29,7 +31,10 @@ constexpr can::Frame request(std::uint8_t to) { return {0x18EA0021U | std::uint3
 
 class J1939Address : public ::testing::Test {
  protected:
-  void SetUp() override { hal::sent.clear(); }
+  void SetUp() override {
+    hal::sent.clear();
+    hal::full = false;
+  }
   static std::size_t claims() { return hal::sent.size(); }
   static can::Frame last() { return hal::sent.back(); }
 };
@@ -64,6 +69,40 @@ TEST_F(J1939Address, IsDefendedAgainstALargerNameAndGivenToASmallerOne) {
   EXPECT_TRUE(a.update(550'000));
   a.receive(claim_of(0x8000'0000'0000'0001U, 0x80), 600'000);
   EXPECT_EQ(a.value(), 0x81) << "no longer its own";
+}
+
+TEST_F(J1939Address, IsClaimedAgainAfterAPauseAndIfTheClaimWasNotSent) {
+  Address a(7);
+  hal::full = true;
+  EXPECT_FALSE(a.update(0));
+  EXPECT_FALSE(a.update(1'000'000)) << "the claim is not on the bus";
+  hal::full = false;
+  EXPECT_FALSE(a.update(1'100'000));
+  EXPECT_EQ(claims(), 1U);
+  EXPECT_TRUE(a.update(1'350'000));
+  a.stop();
+  EXPECT_FALSE(a.update(9'000'000));
+  EXPECT_EQ(claims(), 2U);
+  EXPECT_TRUE(a.update(9'250'000));
+  hal::full = true;
+  a.receive(claim_of(1, 0x80), 9'300'000);
+  hal::full = false;
+  EXPECT_FALSE(a.update(9'600'000)) << "the claim of the next address was lost";
+  EXPECT_EQ(last().id, 0x18EEFF81U);
+  EXPECT_TRUE(a.update(9'850'000));
+}
+
+TEST_F(J1939Address, ThatNobodyLeftFreeIsTriedAgainAfterAPause) {
+  Address a(7);
+  a.update(0);
+  for (std::uint64_t us = 1; a.value() != Address::null; us += 1'000) a.receive(claim_of(1, a.value()), us);
+  EXPECT_FALSE(a.update(10'000'000));
+  a.stop();
+  EXPECT_FALSE(a.update(20'000'000));
+  EXPECT_TRUE(a.update(20'250'000));
+  EXPECT_EQ(a.value(), Address::first);
+  a.receive(claim_of(1, a.value()), 20'300'000);
+  EXPECT_EQ(a.value(), Address::first + 1) << "and as often as before";
 }
 
 TEST_F(J1939Address, IsAnsweredToARequestForIt) {

@@ -33,7 +33,7 @@ const parameters::Ranges& ranges() {
 
 /// The forklift board with parameters, as firmware/board_parameters.cpp has them.
 struct ParameterCell : host_hal::Table9Board<16> {
-  static constexpr bool may_stop = true;
+  static constexpr bool may_stop = true, switches_off = true;
   static inline std::optional<parameters::ParameterBlock> block;
   static inline parameters::ActivePlan active;
 

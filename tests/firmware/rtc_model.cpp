@@ -45,7 +45,7 @@ void RtcModel::reset_domain() {
 double RtcModel::source_hz() const {
   if ((bdcr & enabled) == 0) return 0;
   const std::uint32_t selected = bdcr >> 8 & 3;
-  if (selected == 1 && (bdcr & lse_ready) != 0) return crystal_hz;
+  if (selected == 1 && (bdcr & lse_ready) != 0) return crystal ? crystal_hz : 0;
   return selected == 2 ? 32'000 : 0;
 }
 

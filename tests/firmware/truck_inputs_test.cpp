@@ -335,6 +335,14 @@ TEST(Shelf, WaitsForAMinuteOfRest) {
   EXPECT_TRUE(after(61, empty_uv - 1));
 }
 
+TEST(Shelf, AsksOnceAMinuteIfTheSupplyDoesNotFall) {
+  Shelf shelf;
+  int times = 0;
+  for (std::uint64_t us = 0; us <= 600'000'000; us += 100'000)
+    times += shelf.update(2'500'000, 2'908'000, false, true, us);
+  EXPECT_EQ(times, 10);
+}
+
 TEST(Shelf, OfAWorkshopWaitsForItsAnswerAndNotForVoltageOrBus) {
   Shelf shelf;
   std::uint64_t us = 0;
@@ -344,13 +352,83 @@ TEST(Shelf, OfAWorkshopWaitsForItsAnswerAndNotForVoltageOrBus) {
     }
     return -1.0;
   };
+  EXPECT_FALSE(shelf.ship()) << "nothing is known yet";
   EXPECT_LT(off_after_s(false), 0);
-  shelf.ship();
+  EXPECT_TRUE(shelf.ship());
   EXPECT_NEAR(off_after_s(false), 2, 0.15);
   EXPECT_LT(off_after_s(false), 0) << "once, if key or plug keep it on";
-  shelf.ship();
+  EXPECT_TRUE(shelf.ship());
   EXPECT_LT(off_after_s(true), 0);
+  EXPECT_FALSE(shelf.ship());
   EXPECT_LT(off_after_s(false), 0) << "used meanwhile: no more";
+}
+
+/// A battery with an empty cell and all else at rest, for two minutes.
+class Parking : public ::testing::Test {
+ protected:
+  Parking() {
+    pack.cell_uv.fill(3'300'000);
+    pack.cell_uv[7] = 2'500'000;
+    pack.current_ua = 0;
+    host_hal::begin();
+    host_hal::listening = false;
+  }
+  ~Parking() override { host_hal::begin(); }
+
+  bool goes_off() {
+    TruckSide<true> side;
+    bool off = false;
+    for (int k = 0; k < 1'200; ++k) {
+      pack.time_us += 100'000;
+      off = side.park(pack, inputs, charger, decision, board, TruckBoard::plan()) || off;
+    }
+    return off;
+  }
+
+  measurement::PackSample<16> pack;
+  protection::ExternalInputs inputs;
+  ChargerState charger;
+  protection::Decision decision;
+  BoardStatus board;
+};
+
+TEST_F(Parking, AnInsulationMonitorKeepsTheChipAwakeButNotTheBatteryOn) {
+  board.insulation = {.fitted = true, .ohm = 500'000};
+  EXPECT_TRUE(goes_off());
+  EXPECT_FALSE(host_hal::parked);
+}
+
+TEST_F(Parking, AContactorThatMayBeClosedKeepsTheBatteryOn) {
+  EXPECT_TRUE(goes_off());
+  EXPECT_TRUE(host_hal::parked);
+  const std::int32_t rest_ua = TruckBoard::plan().contactors.rest_ua;
+  for (const std::int32_t ua : {rest_ua + 1, -rest_ua - 1, measurement::no_reading}) {
+    pack.current_ua = ua;
+    EXPECT_FALSE(goes_off()) << ua;
+  }
+  pack.current_ua = -rest_ua;
+  EXPECT_TRUE(goes_off());
+  decision.welded_pole = protection::Pole::minus;
+  EXPECT_FALSE(goes_off());
+  decision.welded_pole = protection::Pole::none;
+  inputs.auxiliary = {.fitted = true, .main_plus_closed = true};
+  EXPECT_FALSE(goes_off());
+  inputs.auxiliary = {.fitted = true, .main_minus_closed = true};
+  EXPECT_FALSE(goes_off());
+  inputs.auxiliary = {.fitted = true};
+  EXPECT_TRUE(goes_off());
+}
+
+TEST_F(Parking, WithoutItsBuildOptionNothingSwitchesOff) {
+  TruckSide<false> side;
+  for (int k = 0; k < 1'200; ++k) {
+    pack.time_us += 100'000;
+    EXPECT_FALSE(side.park(pack, inputs, charger, decision, board, TruckBoard::plan()));
+  }
+  EXPECT_TRUE(host_hal::parked);
+  can::Command command;
+  command.code = can::Command::code_switch_off;
+  EXPECT_EQ(side.command(command, false, [](Privilege) { return true; }), can::CommandAnswer::result_refused);
 }
 
 TEST(TruckOutputs, HeatOnlyAtACharger) {

@@ -5,6 +5,7 @@
 
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
+#include "hal/sleep.hpp"
 
 namespace bms {
 

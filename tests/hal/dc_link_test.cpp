@@ -72,7 +72,7 @@ double hall_pin_v(double current_a) { return 0.66 * 0.98 * (2.5 + 2.5e-3 * curre
 
 TEST(SecondCurrent, LearnsItsZeroWhileAllOutputsAreOff) {
   hall_v = hall_pin_v(0);
-  for (int k = 0; k < 7; ++k) EXPECT_EQ(second_current_ua(), measurement::no_reading) << k;
+  for (int k = 0; k < 2; ++k) EXPECT_EQ(second_current_ua(), measurement::no_reading) << k;
   EXPECT_NEAR(1e-6 * second_current_ua(), 0, 0.5);
   outputs_on = true;
   for (const double current_a : {-900.0, -350.0, -20.0, 0.0, 35.0, 900.0}) {
@@ -83,8 +83,10 @@ TEST(SecondCurrent, LearnsItsZeroWhileAllOutputsAreOff) {
   hall_v = hall_pin_v(300);  // no offset: current through a welded contactor
   for (int k = 0; k < 50; ++k) EXPECT_NEAR(1e-6 * second_current_ua(), 300, 8);
   outputs_on = true;
-  hall_v = 3.3;
-  EXPECT_NEAR(1e-6 * second_current_ua(), 1'000, 30) << "at its rail";
+  for (const double rail_v : {3.3, 0.001}) {
+    hall_v = rail_v;
+    EXPECT_EQ(second_current_ua(), measurement::no_reading) << "without its 5 V or with a broken wire";
+  }
 }
 
 }  // namespace

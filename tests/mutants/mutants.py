@@ -82,7 +82,9 @@ programs_of_boot = [
     *((f"tests/firmware/boot/{name}_test.cpp", "boot_test", ["tests/firmware/storage/flash_model.cpp", *boot])
       for name in ("iso_tp", "slots", "receiver", "memory_of_the_chip", "update_server", "update_power_cut")),
 ]
-part = "boot" if "boot" in sys.argv else "protection"
+part_option = argparse.ArgumentParser(add_help=False)
+part_option.add_argument("--part", choices=("protection", "boot"), default="protection")
+part = part_option.parse_known_args()[0].part
 if part == "boot":
     programs = programs_of_boot
 # the test that runs first for files without a test of their name
@@ -392,9 +394,8 @@ class Build:
 
 
 def main():
-    parser = argparse.ArgumentParser()
+    parser = argparse.ArgumentParser(parents=[part_option])
     parser.add_argument("build")
-    parser.add_argument("--part", choices=("protection", "boot"), default="protection")
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--jobs", type=int, default=2)

@@ -23,6 +23,8 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
 
   bool rest = true, healthy = true;
   int requests_until_restart = 0;  ///< it still answers so many; -1: it does not restart
+  bool states_its_time = true;     ///< since its start; the first update server does not
+  int states_lost = 0;             ///< so many answers about its state, once the image is complete
   int frames_until_lost = -1;      ///< then the connection is lost once
   Bench& bench() { return bench_; }
   const UpdateServer& server() const { return *server_; }
@@ -31,6 +33,10 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
     std::size_t n = 0;
     can::Frame frame;
     while (n < room.size() && !lost_ && node_->next_frame(frame, now_us())) {
+      // the answer of 31 bytes, or of 27: the length in its first frame
+      const bool about_its_state = frame.data[0] == 0x10 && frame.data[2] == 0x62 && frame.data[4] == 0xA1;
+      if (about_its_state && complete_ && states_lost > 0 && states_lost-- > 0) continue;
+      if (about_its_state && !states_its_time) frame.data[1] = 27;
       room[n].kind = monitor::FrameKind::standard;
       room[n].id = frame.id;
       room[n].length = frame.length;
@@ -44,6 +50,8 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   bool send(const can::Frame& frame) override {
     if (frames_until_lost >= 0 && frames_until_lost-- == 0) lost_ = true;
     if (!lost_) node_->receive(frame, now_us());
+    complete_ =
+        complete_ || (frame.data[0] == 4 && frame.data[1] == 0x31 && frame.data[3] == 0xFF && frame.data[4] == 1);
     if (restart_in_ > 0 && frame.data[0] < 0x10 && --restart_in_ == 0) start(false);
     return !lost_;
   }
@@ -85,7 +93,7 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   std::uint64_t challenge_ = 41;
   Clock::time_point started_at_{};
   int restart_in_ = 0;
-  bool lost_ = false;
+  bool lost_ = false, complete_ = false;
 };
 
 class UpdateServerTest : public ::testing::Test {
@@ -135,6 +143,23 @@ TEST_F(UpdateServerTest, AnswersFromBeforeTheRestartSayNothingAboutTheNewImage) 
   w.start_wait_s = 10;  // one answer is lost in the restart
   const auto result = run(w);
   EXPECT_EQ(result.outcome, Outcome::done) << result.reason;
+}
+
+TEST_F(UpdateServerTest, AnAnswerThatIsLostBeforeTheRestartIsNotTheRestart) {
+  battery_.requests_until_restart = 9;
+  battery_.states_lost = 1;
+  auto w = wish();
+  w.start_wait_s = 10;
+  const auto result = run(w);
+  EXPECT_EQ(result.outcome, Outcome::done) << result.reason;
+}
+
+TEST_F(UpdateServerTest, ABatteryThatDoesNotStateItsTimeIsUpdated) {
+  battery_.states_its_time = false;
+  EXPECT_EQ(run(wish()).outcome, Outcome::done);
+  battery_.healthy = false;
+  const auto result = run(wish({.slot = 0, .version = 0x000400, .security_version = 5, .seed = 9}));
+  EXPECT_EQ(result.outcome, Outcome::returned) << result.reason;
 }
 
 TEST_F(UpdateServerTest, ABatteryThatDoesNotRestartIsNotSaidToHaveReturned) {

@@ -4,7 +4,9 @@
 
 #include <fmt/format.h>
 
+#include "files/cell_file.hpp"
 #include "files/text_file.hpp"
+#include "images/chosen_image.hpp"
 #include "tests/firmware/world/operating.hpp"
 
 namespace bms::world {
@@ -16,10 +18,19 @@ using ::testing::IsEmpty;
 constexpr unsigned pack_state = 0x180;
 constexpr double asleep_share = 0.86;  ///< as the page of the board says
 
+/// Wired to switch itself off, with a key that is read.
+Pack pack_that_switches_off() {
+  Pack pack = pack_of(6);
+  pack.image = images::chosen_image(
+      "stm32f405_forklift", files::read_cell("table9"),
+      {"switches_off", {"-DBMS_SWITCHES_OFF=ON", "-DBMS_INPUTS=key;charger_plug;coil_supply;interlock;crash"}});
+  return pack;
+}
+
 /// Parked, with a silent bus, since so long that the chip stops between the samples.
 class Sleep : public ::testing::Test {
  protected:
-  Sleep() : pack_(pack_of(6)), world_(pack_.image, typical_setup(pack_)) {
+  explicit Sleep(const Pack& pack = pack_of(6)) : pack_(pack), world_(pack_.image, typical_setup(pack_)) {
     world_.fit_clock();
     world_.run_ms(4'000);  // the crystal of the clock starts
     EXPECT_EQ(world_.board.stops, 0U) << "the truck's controller talks";
@@ -74,6 +85,17 @@ TEST_F(Sleep, AFrameOfTheTruckWakesTheBoard) {
   EXPECT_GT(asleep_of(30'000), 0.4) << "and asleep again";
 }
 
+/// Its ready flag stays, and its wake-up timer counts no more: a chip that stopped would be reset for ever.
+TEST_F(Sleep, ADeadCrystalOfTheClockLeavesItAwake) {
+  world_.rtc.crystal = false;
+  world_.run_ms(15'000);
+  const unsigned stops = world_.board.stops, before = world_.board.estimates;
+  world_.run_ms(10'000);
+  EXPECT_EQ(world_.board.stops, stops);
+  EXPECT_NEAR(world_.board.estimates - before, 100, 2);
+  EXPECT_LE(world_.board.resets.size(), 1U) << "at most the one of the stop in which it died";
+}
+
 TEST_F(Sleep, ThePlugWakesTheBoard) {
   world_.plugged = true;
   world_.board.can.others_acknowledge = true;
@@ -98,7 +120,12 @@ TEST_F(Sleep, ACellThatRunsDownIsFound) {
   EXPECT_EQ(world_.vehicle.first_cause(), 6U) << "and not that a sample was missing";
 }
 
-TEST_F(Sleep, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
+class SwitchOff : public Sleep {
+ protected:
+  SwitchOff() : Sleep(pack_that_switches_off()) {}
+};
+
+TEST_F(SwitchOff, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
   world_.hold_cell(7, 2.92);  // just above the release of cell undervoltage
   world_.run_ms(90'000);
   EXPECT_FALSE(world_.chip.in_shutdown());
@@ -153,6 +180,7 @@ TEST(Currents, AreThoseOfThePageOfTheBoard) {
   };
   row("on: the bus is alive, or no crystal", on, 0.1 - empty);
   row("parked", parked, 0.1 - empty);
+  row("parked, with a Hall sensor of 10 mA", parked + 10 * 5 / (pack_v * efficiency), 0.1 - empty);
   row("off, from an empty cell on", off, empty);
   const std::string page = files::read_file(BMS_SOURCE_DIR "/boards/stm32f405_forklift/README.md");
   EXPECT_NE(page.find(table), std::string::npos) << table;
