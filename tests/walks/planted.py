@@ -80,7 +80,11 @@ def main():
         write_loads(folder)
         for kind, command in COMMANDS.items():
             environment = dict(os.environ, BMS_PROGRESS="off")
-            expected = run(tool, command, folder, environment)[2]
+            status, faults, expected = run(tool, command, folder, environment)
+            if status != 0 or not expected or faults:
+                print(f"bms {command}, without a planted number: exit status {status}, outputs {sorted(expected)}",
+                      *faults, sep="\n    ", flush=True)
+                return 1
             for call in FROM:
                 environment = dict(environment, LD_PRELOAD=library, PLANT_FROM=str(call))
                 status, faults, _ = run(tool, command, folder, environment, expected)
