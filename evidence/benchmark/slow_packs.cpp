@@ -5,7 +5,7 @@
 //              [--write FOLDER]
 //
 // A set has for each of five intervals and four loads five packs with one fault each and five healthy ones: 200. In
-// every second one the current of a row is a single reading, not the mean of the row.
+// half of them the current of a row is a single reading, not the mean of the row: of each fault, load and interval.
 #include <array>
 #include <atomic>
 #include <cmath>
@@ -55,19 +55,32 @@ double hours_for(double rows_s) {
   return rows_s > 2 ? 8 : 3;
 }
 
+/// What a pack of a set is, by the numbers of its interval, load and fault. The kind of the current and the variant of
+/// the fault change with different digits of them: of each fault, each load and each interval, about half a set has
+/// either kind, and of each kind either variant; four sets have all of each pack.
+struct Place {
+  std::size_t set, interval, load, fault;
+
+  bool samples_current() const { return (set + interval + load + fault) % 2 == 1; }
+  std::size_t variant() const { return (set / 2 + interval / 2 + load / 2) % 2; }
+};
+
 std::vector<Case> cases_of(const Options& o) {
   std::vector<Case> cases;
   std::size_t index = o.first * intervals_s.size() * truth::all_pack_loads.size() * faults.size();
   for (std::size_t set = o.first; set < o.first + o.sets; ++set) {
-    for (const double rows_s : intervals_s) {
-      for (const truth::PackLoad load : truth::all_pack_loads) {
-        for (const auto& fault : faults) {
+    for (std::size_t interval = 0; interval < intervals_s.size(); ++interval) {
+      for (std::size_t of_load = 0; of_load < truth::all_pack_loads.size(); ++of_load) {
+        for (std::size_t fault = 0; fault < faults.size(); ++fault) {
           const std::size_t now = index++;
-          const std::string wanted = fault[(now / faults.size()) % fault.size()];
+          const Place place{set, interval, of_load, fault};
+          const double rows_s = intervals_s[interval];
+          const truth::PackLoad load = truth::all_pack_loads[of_load];
+          const std::string wanted = faults[fault][place.variant()];
           if ((o.rows_s > 0 && o.rows_s != rows_s) || (!o.load.empty() && o.load != name_of(load))) continue;
           if (!o.only.empty() && o.only != wanted && o.only != "healthy") continue;
           const truth::SlowLog log{
-              .load = load, .rows_s = rows_s, .hours = hours_for(rows_s), .samples_current = now % 2 == 1};
+              .load = load, .rows_s = rows_s, .hours = hours_for(rows_s), .samples_current = place.samples_current()};
           if (o.only != "healthy") cases.push_back({now, log, wanted, {}});
           if (o.only.empty() || o.only == "healthy") cases.push_back({now, log, "", {}});
         }

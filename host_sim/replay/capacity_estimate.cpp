@@ -54,24 +54,27 @@ class Stretches {
         from_ah = charge_ah;
         from_s = rec.time_s[k];
       }
-      add(k, charge_ah, current_a);
+      add(k, charge_ah, current_a, current_a * hours);
     }
     end();
     return std::move(list_);
   }
 
  private:
-  void add(std::size_t k, double charge_ah, double current_a) {
+  /// moved_ah: since the row before.
+  void add(std::size_t k, double charge_ah, double current_a, double moved_ah) {
     const EstimateRow e = r_.track.rows[k];
     constexpr std::uint32_t unusable =
         estimator::voltage_missing | estimator::voltage_implausible | estimator::voltage_stuck;
     if ((e.flags & unusable) != 0 || std::isnan(r_.recording.voltage_v[k])) return;
-    const auto at = model::look_up(cell_, e.soc, interval_);
+    // An extended cell file's mechanisms have no value of their own in a row, but are part of the prediction. That is
+    // of the state before this row's voltage corrected it, everything else of the one after.
+    const bool predicted = !r_.cell.mechanisms.empty();
+    const double before = k == 0 ? e.soc : r_.track.rows[k - 1].soc + moved_ah / r_.cell.parameters.capacity_ah;
+    const auto at = model::look_up(cell_, predicted ? before : e.soc, interval_);
     const double rested_v = model::OneRc<double>::voltage({}, at, {0, 0});
-    // an extended cell file's mechanisms have no value of their own in a row, but are part of the prediction
-    const double drop_v = r_.cell.mechanisms.empty()
-                              ? model::OneRc<double>::voltage({}, at, {current_a, 0}) - rested_v + e.v_rc_v
-                              : e.voltage_predicted_v - rested_v;
+    const double drop_v = predicted ? e.voltage_predicted_v - rested_v
+                                    : model::OneRc<double>::voltage({}, at, {current_a, 0}) - rested_v + e.v_rc_v;
     sum_.charge_ah += charge_ah;
     sum_.ocv_v += r_.recording.voltage_v[k] - drop_v;
     sum_.sigma_v += std::abs(drop_v);

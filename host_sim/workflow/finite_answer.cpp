@@ -5,6 +5,9 @@
 #include <initializer_list>
 #include <stdexcept>
 
+#include "measurement/statistics.hpp"
+#include "model/catalogue.hpp"
+
 namespace bms::workflow {
 
 namespace {
@@ -26,6 +29,9 @@ void require_finite(const diagnosis::Diagnosis& d) {
   }
   for (const diagnosis::Finding& f : d.findings) {
     if (!are_finite({f.probability, f.gain})) refuse("the probability of a finding");
+    for (std::size_t k = 0; k < model::catalogue[f.setting.index].parameters; ++k) {
+      if (!are_finite({f.setting.value[k], f.setting.deviation[k]})) refuse("the size of a finding");
+    }
   }
 }
 
@@ -40,7 +46,27 @@ void require_finite(const identification::Identification& i) {
   if (!std::isfinite(i.optimum.cost)) refuse("the error of the identified model at its start");
   if (!are_finite({i.estimation.rmse_v, i.estimation.output_variance_v2})) refuse("the error of the identified model");
   for (const identification::Parameter& p : i.parameters) {
-    if (!std::isfinite(p.value)) refuse("a parameter");
+    if (!are_finite({p.value, p.std})) refuse("a parameter");
+  }
+}
+
+void require_finite(const IdentifyResult& r) {
+  require_finite(r.identification);
+  for (const auto& [path, of] : r.validations) {
+    if (!are_finite({of.rmse_v, of.fit_percent})) refuse("the error of the model on other recordings");
+  }
+  if (!r.joint) return;
+  const identification::StructureChoice& choice = r.joint->choice;
+  const identification::ModelErrors& errors = choice.errors;
+  if (!choice.fit.value.allFinite() || !choice.fit.std.allFinite())
+    refuse("a parameter of the fit over all recordings");
+  if (!are_finite({choice.fit.optimum.cost, measurement::rms(choice.fit.rmse_v)}))
+    refuse("the error of the fit over all recordings");
+  if (!are_finite({errors.resistance_fraction, errors.resistance_per_ev, errors.initial_soc, errors.model_v,
+                   errors.correlation_s}))
+    refuse("the error to expect of the fit over all recordings");
+  for (const identification::LeftOutError& e : r.joint->held_out) {
+    if (!are_finite({e.rmse_v, e.soc_error, e.resistance_error})) refuse("the prediction of a recording");
   }
 }
 

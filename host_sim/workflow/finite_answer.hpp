@@ -5,6 +5,7 @@
 #include "diagnosis/pack/pack_verdict.hpp"
 #include "diagnosis/verdict.hpp"
 #include "identification/identify.hpp"
+#include "workflow/identify_cell.hpp"
 
 namespace bms::workflow {
 
@@ -12,5 +13,6 @@ namespace bms::workflow {
 void require_finite(const diagnosis::Diagnosis& answer);
 void require_finite(const diagnosis::pack::PackDiagnosis& answer);
 void require_finite(const identification::Identification& answer);
+void require_finite(const IdentifyResult& answer);  ///< with its validations and the joint fit
 
 }  // namespace bms::workflow

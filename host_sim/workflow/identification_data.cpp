@@ -14,12 +14,15 @@ namespace bms::workflow {
 
 namespace {
 
-/// Of single odd voltages.
+/// Of single odd voltages: readings that went wrong on their way. A cell under a constant current cannot leave its
+/// voltage for one row and come back.
 struct OddReadings {
-  double quiet = 0.01;     ///< change of the current, as a share of the largest current
-  double least_v = 0.005;  ///< from the voltages before and after,
-  double times = 12;       ///< and so many times the usual change from row to row
-  double most = 0.01;      ///< share of the rows: more are noise
+  double quiet = 0.01;  ///< change of the current, as a share of the largest: noise of an ammeter, 1 % of R0 at most
+  double least_v =
+      0.005;           ///< from the voltages before and after: less does not move a fit, which has thousands of rows
+  double times = 12;   ///< and of the usual change, without equal readings: 11 sigma of white noise, 12 digits of a
+                       ///< coarse converter, whose noise is the last one or two
+  double most = 0.01;  ///< share of the rows: errors that are as frequent are the instrument's noise
 };
 constexpr OddReadings of_odd_readings{};
 constexpr std::size_t least_samples = 10;  ///< in the window; as in a recording

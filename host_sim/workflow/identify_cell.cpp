@@ -388,6 +388,7 @@ IdentifyResult identify_cell(const IdentifyOptions& options) {
   }
   if (result.cell_file && result.joint)
     add_coverage(options.hold_out, options.reading, *result.cell_file, *result.joint);
+  require_finite(result);
   report(options.progress, 1, "");
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return result;

@@ -120,6 +120,7 @@ dp::PackRecording pack_of(const measurement::Recording& r, const files::CellFile
                          .pack_v = r.pack_voltage_v.copy(),
                          .single_readings = false,
                          .count_walk = 0,
+                         .usual_step_s = 0,
                          .charge_unknown = {}};
   for (const measurement::Column& c : r.cell_voltage_v) pack.cell_v.push_back(c.copy());
   for (const measurement::Column& c : r.cell_temperature_c) pack.sensor_c.push_back(c.copy());
@@ -221,6 +222,10 @@ PackResult diagnose_pack(const files::CellFile& cell, measurement::Recording rec
   };
   r.diagnosis = dp::diagnose_pack(cell.parameters, r.pack, of_cells);
   require_finite(r.diagnosis);
+  if (r.pack.single_readings)
+    r.warnings.push_back({"single_readings",
+                          "the current of a row is taken for a single reading, not for the mean of the row: what it "
+                          "did between two rows is an error of the counted charge"});
   for (std::size_t c = 0; c < r.diagnosis.channels.cells.size(); ++c) {
     const std::size_t count = r.diagnosis.channels.cells[c].glitches;
     if (count > 0)

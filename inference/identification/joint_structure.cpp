@@ -262,15 +262,15 @@ ModelErrors errors_of(const std::vector<LeftOutError>& all) {
   errors.model_v = remaining.constant;
   errors.correlation_s =
       std::accumulate(correlation.begin(), correlation.end(), 0.0) / static_cast<double>(correlation.size());
-  std::vector<double> per_ev;
+  std::vector<GrowthAt> outside;
   for (const LeftOutError& e : all) {
     if (!(e.beyond_per_ev > 0)) continue;
     const double of_rest = std::max(0.0, std::pow(e.rest_v, 2) - std::pow(errors.model_v, 2)) /
                            std::max(1e-12, std::pow(e.overpotential_v, 2));
     const double more = std::pow(e.resistance_error, 2) + of_rest - std::pow(errors.resistance_fraction, 2);
-    per_ev.push_back(std::sqrt(std::max(0.0, more)) / e.beyond_per_ev);
+    outside.push_back({e.temperature_c.value_or(0), std::sqrt(std::max(0.0, more)) / e.beyond_per_ev});
   }
-  errors.resistance_per_ev = growth_outside(per_ev);
+  errors.resistance_per_ev = growth_outside(by_edge(outside));  // it is of two edges, not of all their recordings
   return errors;
 }
 

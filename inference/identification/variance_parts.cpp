@@ -56,6 +56,21 @@ VarianceParts variance_parts(std::span<const double> rms, std::span<const double
   return {std::sqrt(constant), std::sqrt(per)};
 }
 
+std::vector<double> by_edge(std::span<const GrowthAt> outside) {
+  std::vector<double> edges;
+  if (outside.empty()) return edges;
+  constexpr double near_k = 5;  // as in by_temperature()
+  const auto [coldest, hottest] = std::ranges::minmax(outside, {}, &GrowthAt::temperature_c);
+  const bool one = hottest.temperature_c - coldest.temperature_c <= near_k;
+  const double middle_c = (coldest.temperature_c + hottest.temperature_c) / 2;
+  measurement::MeanSquare colder, hotter;
+  for (const GrowthAt& g : outside) (one || g.temperature_c < middle_c ? colder : hotter).add(g.per_ev);
+  for (const measurement::MeanSquare& edge : {colder, hotter}) {
+    if (edge.count() > 0) edges.push_back(edge.root());
+  }
+  return edges;
+}
+
 double growth_outside(std::span<const double> per_ev) {
   return per_ev.empty() ? 0 : std::hypot(model::default_resistance_per_ev, measurement::rms(per_ev));
 }

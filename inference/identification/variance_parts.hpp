@@ -2,6 +2,7 @@
 #pragma once
 
 #include <span>
+#include <vector>
 
 namespace bms::identification {
 
@@ -15,7 +16,16 @@ struct VarianceParts {
 /// largest errors do not decide alone. With fewer than two sets, or if by does not differ, all is constant.
 VarianceParts variance_parts(std::span<const double> rms, std::span<const double> by);
 
-/// ModelErrors::resistance_per_ev from those of the recordings beyond the two edges of the range [eV]; 0 without any.
+/// Of a recording beyond an edge of the range.
+struct GrowthAt {
+  double temperature_c = 0, per_ev = 0;
+};
+
+/// RMS of the recordings beyond each edge, the colder one first: recordings of one temperature share the error of the
+/// law. One value if all lie beyond the same edge: within 5 K.
+std::vector<double> by_edge(std::span<const GrowthAt> outside);
+
+/// ModelErrors::resistance_per_ev from the RMS beyond each of the two edges of the range [eV]; 0 without any.
 /// Two edges say little about a scale. Before them the square of the scale is model::default_resistance_per_ev squared
 /// with the weight of two edges (scaled inverse chi square, two degrees of freedom); its mean after them is the sum of
 /// the default's square and theirs.

@@ -35,9 +35,11 @@ REPORT = re.compile(r"[0-9.]+ million steps/s")
 
 def write_loads(folder):
     rows, pack = ["time_s,current_a,voltage_v"], ["time_s,current_a,v_1,v_2,v_3,v_4"]
+    relaxing_v = 0
     for k in range(1200):
         a = -3 if k // 60 % 2 else 0.0
-        v = 3.3 + 0.025 * a - 1e-5 * k + 1e-4 * (k % 3)
+        relaxing_v += (0.015 * a - relaxing_v) / 20
+        v = 3.3 + 0.02 * a + relaxing_v - 1e-5 * k + 1e-4 * (k % 3)
         rows.append(f"{k},{a},{v:.4f}")
         pack.append(f"{k},{a}," + ",".join(f"{v + 1e-3 * c + 1e-4 * ((k + c) % 5):.4f}" for c in range(4)))
     (folder / "in.csv").write_text("\n".join(rows) + "\n")
@@ -80,7 +82,11 @@ def main():
         write_loads(folder)
         for kind, command in COMMANDS.items():
             environment = dict(os.environ, BMS_PROGRESS="off")
-            expected = run(tool, command, folder, environment)[2]
+            status, faults, expected = run(tool, command, folder, environment)
+            if status != 0 or not expected or faults:
+                print(f"bms {command}, without a planted number: exit status {status}, outputs {sorted(expected)}",
+                      *faults, sep="\n    ", flush=True)
+                return 1
             for call in FROM:
                 environment = dict(environment, LD_PRELOAD=library, PLANT_FROM=str(call))
                 status, faults, _ = run(tool, command, folder, environment, expected)

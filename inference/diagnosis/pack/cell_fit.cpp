@@ -85,7 +85,8 @@ void add_row_noise(const Track& t, const Vector& theta, std::size_t k, double di
   const double soc = t.soc[delayed.row] + dz, beyond = std::max({0.0, n.lowest_soc - soc, soc - n.highest_soc});
   const double unknown_ohm = n.beyond_resistance * beyond * t.r0_ohm;
   noise.edge_v2[k] += square(unknown_ohm * di / edge);
-  noise.slow_v2[k] = square(n.track_soc * steeper_v) + square((n.ocv_axis + n.beyond_axis * beyond) * slope_v) +
+  const double track_soc = t.soc_sigma.empty() ? n.track_soc : std::hypot(n.track_soc, t.soc_sigma[delayed.row]);
+  noise.slow_v2[k] = square(track_soc * steeper_v) + square((n.ocv_axis + n.beyond_axis * beyond) * slope_v) +
                      2 * square(t.ocv_tolerance_v) * independent + square(unknown_ohm * t.instant_a[delayed.row]);
   // a step of the voltage lies before or after the moment of sampling, not in between; the whitener multiplies by
   // edge^2

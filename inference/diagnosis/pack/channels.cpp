@@ -82,13 +82,59 @@ ChannelState frozen_rows(const std::vector<double>& v, const Track& track, const
   return s;
 }
 
-/// Squared difference of changes: readings against those of the median cell `lag` rows before, with the best factor.
-double error_at_lag(const std::vector<double>& v, const std::vector<double>& median_v, std::ptrdiff_t lag) {
+/// Changes from row to row, and the median of those of the other cells. Not of the median voltage: where the cells lie
+/// apart, it is the voltage of one cell, and behind itself no cell is late.
+class OtherCells {
+ public:
+  explicit OtherCells(const std::vector<std::vector<double>>& cell_v) {
+    std::vector<double> changes;
+    for (std::size_t k = 1; k < cell_v.front().size(); ++k) {
+      changes.clear();
+      for (const auto& v : cell_v) {
+        if (std::isfinite(v[k] - v[k - 1])) changes.push_back(v[k] - v[k - 1]);
+      }
+      std::sort(changes.begin(), changes.end());
+      middle_.push_back(middle_of(changes));
+    }
+  }
+
+  /// By row; NaN where no other cell has a change.
+  std::vector<double> changes_without(const std::vector<double>& v) const {
+    std::vector<double> changes(v.size(), no_value);
+    for (std::size_t k = 1; k < v.size(); ++k) changes[k] = without(middle_[k - 1], v[k] - v[k - 1]);
+    return changes;
+  }
+
+ private:
+  /// The changes around the median: the next lower and the next higher one, and between them that of an odd number.
+  struct Middle {
+    double low = no_value, median = no_value, high = no_value;
+  };
+
+  static Middle middle_of(const std::vector<double>& sorted) {
+    const std::size_t n = sorted.size(), half = n / 2;
+    if (n < 2) return {};
+    if (n % 2 == 0) return {sorted[half - 1], no_value, sorted[half]};
+    return {sorted[half - 1], sorted[half], sorted[half + 1]};
+  }
+  /// The median without `own`, which is among them if it is finite.
+  static double without(const Middle& m, double own) {
+    if (!std::isfinite(own)) return std::isfinite(m.median) ? m.median : (m.low + m.high) / 2;
+    if (!std::isfinite(m.median)) return own <= m.low ? m.high : m.low;
+    if (own == m.median) return (m.low + m.high) / 2;
+    return (m.median + (own < m.median ? m.high : m.low)) / 2;
+  }
+
+  std::vector<Middle> middle_;
+};
+
+/// Squared difference of changes: those of the readings against `others` `lag` rows before, with the best factor.
+double error_at_lag(const std::vector<double>& v, const std::vector<double>& others_v, std::ptrdiff_t lag) {
   double vv = 0, vm = 0, mm = 0;
   const auto rows = static_cast<std::ptrdiff_t>(v.size());
   for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, 1 + lag); k < std::min(rows, rows + lag); ++k) {
     const auto at = static_cast<std::size_t>(k), from = static_cast<std::size_t>(k - lag);
-    const double dv = v[at] - v[at - 1], dm = median_v[from] - median_v[from - 1];
+    const double dv = v[at] - v[at - 1], dm = others_v[from];
     if (!std::isfinite(dv + dm)) continue;
     vv += dv * dv;
     vm += dv * dm;
@@ -97,16 +143,16 @@ double error_at_lag(const std::vector<double>& v, const std::vector<double>& med
   return mm > 0 && vv > 0 ? 1 - vm * std::max(vm, 0.0) / (vv * mm) : 1;
 }
 
-/// Lag of the readings behind those of the median cell, in whole rows. Not behind the current: what it did within a row
-/// is unknown, and a load with a period of its own is alike at several lags.
-double best_lag(const std::vector<double>& v, const std::vector<double>& median_v, double step_s) {
+/// Lag of the readings behind those of the other cells, whose changes are others_v, in whole rows. Not behind the
+/// current: what it did within a row is unknown, and a load with a period of its own is alike at several lags.
+double best_lag(const std::vector<double>& v, const std::vector<double>& others_v, double step_s) {
   const auto rows_of = [&](double s) { return static_cast<std::ptrdiff_t>(s / step_s); };
-  const double now = error_at_lag(v, median_v, 0);
+  const double now = error_at_lag(v, others_v, 0);
   double best = now;
   std::ptrdiff_t found = 0;
   const double last_s = std::max(of_channels.lag_to_s, of_channels.lag_rows * step_s);
   for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(last_s); ++lag) {
-    const double error = error_at_lag(v, median_v, lag);
+    const double error = error_at_lag(v, others_v, lag);
     if (error >= best) continue;
     best = error;
     found = lag;
@@ -186,7 +232,9 @@ std::vector<std::size_t> Channels::late(double step_s) const {
   for (std::size_t k = 0; k < cells.size(); ++k) {
     if (!cells[k].held_s && std::abs(cells[k].lag_s - usual_s) > step_s * of_channels.late_rows) list.push_back(k);
   }
-  if (static_cast<double>(list.size()) > of_channels.grouped_share * static_cast<double>(cells.size())) list.clear();
+  const double most =
+      std::max(1.0, of_channels.grouped_share * static_cast<double>(cells.size()));  // one is not a group
+  if (static_cast<double>(list.size()) > most) list.clear();
   return list;
 }
 
@@ -205,17 +253,19 @@ Channels check_channels(const Track& track, PackRecording& pack) {
     median_v.push_back(measurement::median(row));
   }
   const std::vector<double> movement_v = movement_of(track);
+  std::vector<std::size_t> glitches;
+  for (std::vector<double>& v : pack.cell_v) glitches.push_back(remove_glitches(v, median_v, movement_v));
+  const OtherCells others(pack.cell_v);
   for (std::vector<double>& v : pack.cell_v) {
-    const std::size_t glitches = remove_glitches(v, median_v, movement_v);
     const double most_v = moving_v(v, track, pack);
     ChannelState s = frozen_rows(v, track, pack, most_v);
     if (s.moving_rows >= of_channels.moving_rows && s.frozen_share > of_channels.held_share) {
       s.held_s = time_between_changes(v, track, pack, most_v);
       keep_fresh_readings(v);
     } else {
-      s.lag_s = best_lag(v, median_v, track.step_s);
+      s.lag_s = best_lag(v, others.changes_without(v), track.step_s);
     }
-    s.glitches = glitches;
+    s.glitches = glitches[channels.cells.size()];
     channels.cells.push_back(s);
   }
   return channels;

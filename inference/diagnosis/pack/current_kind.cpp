@@ -57,16 +57,17 @@ void find_current_kind(PackRecording& pack, double capacity_ah) {
   const double square_a2 = c.aa / c.rows, two_rows_a2 = c.two_rows_aa / c.two_rows;
   std::vector<double> steps_s;
   for (std::size_t k = 1; k < pack.rows(); ++k) steps_s.push_back(pack.time_s[k] - pack.time_s[k - 1]);
-  const double step_s = measurement::median(steps_s);
+  pack.usual_step_s = measurement::median(steps_s);
   const double independent = std::clamp(2 - two_rows_a2 / square_a2, 0.0, 1.0);
   const double share = (1 - independent) * limits.step_in_row + independent * limits.new_in_row;
-  pack.count_walk = std::sqrt(share * square_a2 * step_s / limits.seconds_per_hour) / capacity_ah;
+  pack.count_walk = std::sqrt(share * square_a2 * pack.usual_step_s / limits.seconds_per_hour) / capacity_ah;
 }
 
 double mean_current_a(const PackRecording& pack, std::size_t k) {
   const double now_a = pack.current_a[k];
   if (!pack.single_readings || k == 0 || !std::isfinite(pack.current_a[k - 1])) return now_a;
-  return (pack.current_a[k - 1] + now_a) / 2;
+  const bool is_gap = pack.time_s[k] - pack.time_s[k - 1] > limits.gap_steps * pack.usual_step_s;
+  return is_gap ? now_a : (pack.current_a[k - 1] + now_a) / 2;
 }
 
 }  // namespace bms::diagnosis::pack

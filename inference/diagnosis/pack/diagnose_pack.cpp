@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include <fmt/format.h>
 #include <Eigen/Cholesky>
@@ -337,6 +336,7 @@ std::optional<PackFinding> correct_current(State& s, const model::CellParameters
   s.pack.soc = std::move(shared.soc);
   for (double& a : s.pack.current_a) a = (1 - shared.gain) * a - shared.offset_a;
   s.track = track_of(cell, s.pack, shared.resistance_factor, shared.polarisation);
+  s.track.soc_sigma = std::move(shared.soc_sigma);
   d.another_cell = shared.ocv_apart_v > limits.shared.another_cell * s.track.ocv_tolerance_v;
   return std::move(shared.finding);
 }

@@ -21,6 +21,7 @@ struct PackRecording {
   std::vector<double> pack_v;                 ///< empty: no voltmeter of the pack
   bool single_readings = false;               ///< what current_a is (current_kind.hpp)
   double count_walk = 0;                      ///< [SOC] error of the counted charge after an hour; grows with sqrt(t)
+  double usual_step_s = 0;                    ///< between rows; set with single_readings
   std::string charge_unknown;                 ///< why the counted charge does not test the sensor; empty: it does
 
   std::size_t rows() const { return time_s.size(); }

@@ -46,8 +46,10 @@ struct PackThresholds {
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
       {0.0005, 0, 0, 0, 8, 0, 0, 0.001},
   }};
-  /// Of the voltage's changes from row to row, that those of the current explain: of means it is at most 0.4.
+  /// Of the voltage's changes from row to row, that those of the current explain. Of means it is at most 0.4 if the
+  /// load steps at random moments, cos^2(pi / n) of a load with a period of n rows, and 1 if it steps between rows.
   double single_readings = 0.7;
+  double gap_steps = 1.5;  ///< times the usual time between rows, from which on rows are missing
   /// A step at any moment of a row: variance of its mean over the square of the step. A current that is another one in
   /// each row: the same over the square of its changes.
   double step_in_row = 1.0 / 12, new_in_row = 0.5;
@@ -165,14 +167,16 @@ struct PackThresholds {
 
   /// Of the mean of the cells against the cell file. Sizes in C: of the current that charges the cell in an hour.
   struct Shared {
-    static constexpr int ocv_waves = 6, resistance_waves = 3;
+    static constexpr int ocv_waves = 6, resistance_waves = 3, charge_waves = 4;
     double block_s = 10, block_rows = 6;  ///< length of a block, at least
     double longest_gap_s = 600, longest_step_s = 60, least_hours = 0.5;
     double start_soc = 0.05;                                 ///< standard deviation of the start
     double healthy_offset_c = 0.0012, healthy_gain = 0.004;  ///< of a current sensor
     double healthy_capacity = 0.01;                          ///< of all cells, against the cell file
-    /// polarisation: of R1 next to R0. Slow rows show only their sum, and a cell of any age has the file's ratio about.
-    double resistance = 1, polarisation = 0.3, per_k = 0.03, resistance_wave = 0.03;
+    double resistance = 1, per_k = 0.03, resistance_wave = 0.03;
+    /// Of R1 next to R0: fast rows show both. Slow ones show only their sum, and a cell of any age has the file's ratio
+    /// about; from this share of R1 on that shows within a row, over R0.
+    double polarisation = 1, slow_polarisation = 0.3, slow_from = 0.1;
     /// The cells may be others than that of the file: errors of its OCV, over its tolerance, all as probable.
     std::array<double, 5> ocv_factors = {1, 2, 4, 8, 16};
     double another_cell = 3;    ///< RMS of these errors over the tolerance, from which on the file is of another cell
@@ -180,6 +184,7 @@ struct PackThresholds {
     double least_factor = 0.3;  ///< of the resistances against the cell file
     double fault_offset_c = 0.03, fault_gain = 0.1, fault_capacity = 0.15;
     double least_offset_c = 0.004, least_gain = 0.02, least_capacity = 0.04, most_capacity = 0.5;
+    double no_walk = 1e-9;                           ///< [SOC] of a count that does not walk
     double soc_axis = 0.003, soc_walk = 0.0015;      ///< error of the SOC; the same after an hour
     double slope_reach = 0.005;                      ///< [SOC] over which the slope of the OCV is taken
     double most_offset_c = 0.04, search_soc = 0.02;  ///< of the search for a start: range, steps of the charge

@@ -9,84 +9,21 @@
 #include <Eigen/Cholesky>
 
 #include "diagnosis/noise.hpp"
-#include "diagnosis/pack/current_kind.hpp"
 #include "diagnosis/pack/damped_fit.hpp"
 #include "diagnosis/pack/noise_search.hpp"
 #include "diagnosis/pack/pack_likelihood.hpp"
 #include "diagnosis/pack/pack_thresholds.hpp"
 #include "diagnosis/pack/shared_blocks.hpp"
+#include "diagnosis/pack/shared_model.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis::pack {
 
 namespace {
 
+using namespace shared;
+
 constexpr const PackThresholds::Shared& of_shared = limits.shared;
-
-enum Unknown : Eigen::Index {
-  start,
-  sensor_offset,
-  sensor_gain,
-  all_capacity,
-  all_resistance,
-  all_polarisation,
-  warmth,
-  level,
-  lead,
-  wave_1,
-  resistance_wave_1 = wave_1 + PackThresholds::Shared::ocv_waves,
-  unknowns = resistance_wave_1 + PackThresholds::Shared::resistance_waves
-};
-using Unknowns = Eigen::Matrix<double, unknowns, 1>;
-
-struct Problem {
-  const Track& track;
-  const PackRecording& pack;
-  std::vector<double> charge;  ///< by row: that the sensor has counted, over the capacity
-  Blocks blocks;
-  Unknowns healthy = Unknowns::Zero();
-};
-
-Unknowns healthy_of(const Problem& p, double ocv_factor) {
-  const Track& t = p.track;
-  const double hours = limits.hours_per_day * t.days.back(), walk_c = p.pack.count_walk / std::sqrt(hours);
-  Unknowns u = Unknowns::Constant(ocv_factor * t.ocv_tolerance_v / std::numbers::sqrt2);
-  u[start] = of_shared.start_soc;
-  u[sensor_offset] = std::hypot(of_shared.healthy_offset_c, walk_c) * t.capacity_ah;  // a walk looks like one
-  u[sensor_gain] = of_shared.healthy_gain;
-  u[all_capacity] = of_shared.healthy_capacity;
-  u[all_resistance] = of_shared.resistance;
-  u[all_polarisation] = of_shared.polarisation;
-  u[warmth] = of_shared.per_k;
-  u[level] = ocv_factor * t.ocv_tolerance_v;
-  u[lead] = of_shared.lead_rows;
-  for (Eigen::Index w = resistance_wave_1; w < unknowns; ++w) u[w] = of_shared.resistance_wave;
-  return u;
-}
-
-/// State of charge and RC voltage by row for these unknowns.
-struct Course {
-  std::vector<double> soc, v_rc_v;
-};
-
-Course course_of(const Problem& p, const Unknowns& u) {
-  Course c;
-  double v_rc_v = 0;
-  std::uint8_t interval = 0;
-  for (std::size_t k = 0; k < p.pack.rows(); ++k) {
-    const double lasted_s = p.pack.time_s[k] - p.pack.time_s.front();
-    const double lost = u[sensor_offset] * lasted_s / (3'600 * p.track.capacity_ah);
-    c.soc.push_back(p.track.soc.front() + u[start] +
-                    (1 + u[all_capacity]) * ((1 - u[sensor_gain]) * p.charge[k] - lost));
-    const double mean_a = mean_current_a(p.pack, k);
-    const double current_a = (1 - u[sensor_gain]) * (std::isfinite(mean_a) ? mean_a : 0) - u[sensor_offset];
-    const double dt_s = k > 0 ? p.pack.time_s[k] - p.pack.time_s[k - 1] : 0;
-    const auto at = model::look_up(p.track.cell, c.soc[k], interval);
-    v_rc_v += -std::expm1(-dt_s / (at.r1_ohm * at.c1_f)) * (at.r1_ohm * current_a - v_rc_v);
-    c.v_rc_v.push_back(v_rc_v);
-  }
-  return c;
-}
 
 /// The linear model around u, white.
 struct Around {
@@ -100,41 +37,10 @@ struct Around {
   Columns white;  ///< by block: the unknowns, and last the residual
 };
 
-double slope_at(const Track& t, double soc) {
-  const double reach = of_shared.slope_reach;
-  return (model::look_up(t.cell, soc + reach).ocv_v - model::look_up(t.cell, soc - reach).ocv_v) / (2 * reach);
-}
-
-/// The columns of one block, and last what u does not explain.
-void set_row(const Problem& p, const Unknowns& u, std::size_t block, double soc, double v_rc_v, Columns& columns) {
-  const Blocks& b = p.blocks;
-  const auto at = model::look_up(p.track.cell, soc);
-  const double current_a = (1 - u[sensor_gain]) * b.current_a[block] - u[sensor_offset];
-  const double hours = (b.time_s[block] - p.pack.time_s.front()) / 3'600, r0_v = at.r0_ohm * current_a;
-  const double slope_v = slope_at(p.track, soc), moved = soc - p.track.soc.front() - u[start];
-  auto row = columns.row(static_cast<Eigen::Index>(block));
-  row[start] = slope_v;
-  row[sensor_offset] = -slope_v * hours / p.track.capacity_ah - at.r0_ohm - at.r1_ohm;
-  row[sensor_gain] = -slope_v * moved - r0_v - v_rc_v;
-  row[all_capacity] = slope_v * moved;
-  row[all_resistance] = r0_v + v_rc_v;
-  row[all_polarisation] = v_rc_v;
-  row[warmth] = b.warmer_k[block] * (r0_v + v_rc_v);
-  row[level] = 1;
-  row[lead] = at.r0_ohm * b.change_a[block];
-  const auto wave = [&](Eigen::Index k) { return std::cos(std::numbers::pi * static_cast<double>(k + 1) * soc); };
-  for (Eigen::Index k = 0; k < PackThresholds::Shared::ocv_waves; ++k) row[wave_1 + k] = wave(k);
-  for (Eigen::Index k = 0; k < PackThresholds::Shared::resistance_waves; ++k)
-    row[resistance_wave_1 + k] = wave(k) * (r0_v + v_rc_v);
-  double model_v = at.ocv_v + r0_v + v_rc_v;
-  for (Eigen::Index k = all_resistance; k < unknowns; ++k) model_v += row[k] * u[k];
-  row[unknowns] = b.voltage_v[block] - model_v;
-}
-
 Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const NoiseModel& noise) {
   const std::size_t blocks = p.blocks.count();
   const Course course = course_of(p, u);
-  const double walk2 = of_shared.soc_walk * of_shared.soc_walk + p.pack.count_walk * p.pack.count_walk;
+  const double walk2 = of_shared.soc_walk * of_shared.soc_walk, beyond2 = beyond_waves(p);
   const std::vector<double> soc = p.blocks.means(course.soc), v_rc_v = p.blocks.means(course.v_rc_v);
   Around a;
   a.u = u;
@@ -144,7 +50,7 @@ Around around(const Problem& p, const Unknowns& u, const Unknowns& prior, const 
   for (std::size_t k = 0; k < blocks; ++k) {
     set_row(p, u, k, soc[k], v_rc_v[k], columns);
     const double hours = (p.blocks.time_s[k] - p.pack.time_s.front()) / 3'600;
-    const double axis2 = of_shared.soc_axis * of_shared.soc_axis + walk2 * hours,
+    const double axis2 = of_shared.soc_axis * of_shared.soc_axis + walk2 * hours + beyond2,
                  slope_v = columns(static_cast<Eigen::Index>(k), start);
     a.rows.slow_v2[k] = axis2 * slope_v * slope_v;
     a.residual_v.push_back(columns(static_cast<Eigen::Index>(k), unknowns));
@@ -259,6 +165,23 @@ double ocv_apart_v(const Problem& p, const Unknowns& u) {
     apart.add(v);
   }
   return apart.root();
+}
+
+/// By row, after the fit; empty if the count does not walk.
+std::vector<double> soc_sigma_of(const Problem& p, const Around& a, const Unknowns& prior) {
+  std::vector<double> sigma;
+  if (!(p.pack.count_walk > 0)) return sigma;
+  const Normal covariance = normal_of(a, prior).ldlt().solve(Normal::Identity());
+  for (std::size_t k = 0; k < p.pack.rows(); ++k) {
+    const double hours = (p.pack.time_s[k] - p.pack.time_s.front()) / 3'600;
+    Unknowns row = Unknowns::Zero();
+    row[start] = 1;
+    row[sensor_offset] = -hours / p.track.capacity_ah;
+    for (Eigen::Index w = 0; w < PackThresholds::Shared::charge_waves; ++w)
+      row[charge_wave_1 + w] = charge_wave(w, hours / p.hours());
+    sigma.push_back(std::sqrt(std::max(0.0, row.dot(covariance * row)) + beyond_waves(p)));
+  }
+  return sigma;
 }
 
 /// By row, on the resistances of the cell file.
@@ -385,6 +308,9 @@ SharedState shared_state_of(const Track& track, const PackRecording& pack) {
   if (s.finding) s.finding->after_s = named_after_s(p, best, s.finding->cause);
   if (!s.finding) best = fit_from(p, best.u, p.healthy, best.noise);
   s.soc = course_of(p, best.u).soc;
+  Unknowns prior = p.healthy;
+  if (s.finding) prior[sensor_offset] = std::hypot(prior[sensor_offset], of_shared.fault_offset_c * track.capacity_ah);
+  s.soc_sigma = soc_sigma_of(p, best, prior);
   s.resistance_factor = factor_of(p, best.u, s.soc);
   s.offset_a = best.u[sensor_offset];
   s.offset_sigma_a =

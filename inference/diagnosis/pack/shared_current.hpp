@@ -4,7 +4,12 @@
 // file; the errors of the current sensor are unknowns next to those of the cell file:
 //
 //   v(t) = OCV(z) + (1 + resistance) (R0(z) I + v_rc) + polarisation v_rc + level + waves of the OCV and of R0
-//   I = (1 - gain) I_read - offset          z(t) = start + (1 + capacity) integral of I / Q
+//   I = (1 - gain) I_read - offset          z(t) = start + (1 + capacity) integral of I / Q + waves
+//
+// The waves are the error of a count of single readings (current_kind.hpp), a random walk. It is noise, but of all
+// frequencies down to the length of the recording, where an offset, a gain and a capacity are: as unknowns with the
+// variance of the walk, none of the three takes it for itself, and the data distinguish it from them as far as they
+// can.
 //
 // How wrong the file's OCV is for these cells is not known: the file may be of another cell, scaled. The probability of
 // the data is the mean over several sizes of that error, for a healthy sensor as for a faulty one.
@@ -26,6 +31,7 @@ namespace bms::diagnosis::pack {
 struct SharedState {
   std::string not_tested;                 ///< why; empty: tested
   std::vector<double> soc;                ///< by row, of the mean of the cells
+  std::vector<double> soc_sigma;          ///< standard deviation by row; empty: of a count without a walk
   std::vector<double> resistance_factor;  ///< by row, on R0 and R1 of the cell file: temperature, age
   double polarisation = 0;                ///< more on R1, as a share of that of the cell file
   double ocv_apart_v = 0;                 ///< RMS by which the cells' OCV differs from that of the file

@@ -22,6 +22,7 @@ struct Track {
   /// row does not distinguish them.
   double unseen_share = 0;
   std::vector<double> soc, v_rc_v, model_v;  ///< of the median cell
+  std::vector<double> soc_sigma;             ///< by row, of what a count of single readings adds; empty: nothing
   bool is_calibrated = false;                ///< the resistances follow from this pack
   std::vector<double> r0_by_row_ohm;         ///< with the factor on the resistances of the cell file
   std::vector<double> r1_by_row_ohm, tau_s;  ///< the same of the polarisation

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <span>
 
 #include "files/cell_file.hpp"
 #include "identification/joint_structure.hpp"
@@ -281,6 +282,16 @@ TEST(JointStructure, TheGrowthFromTwoEdgesHoldsTheErrorBeyondThem) {
   EXPECT_LT(inside, 0.99 * cells);
   EXPECT_LT(by_rms, 0.85 * cells);
   EXPECT_EQ(growth_outside({}), 0);
+}
+
+TEST(JointStructure, AnEdgeWithManyRecordingsCountsOnce) {
+  const std::array<GrowthAt, 5> outside = {{{-10, 0.3}, {-9, 0.3}, {-10.5, 0.3}, {-10, 0.3}, {45, 0.1}}};
+  const std::vector<double> edges = by_edge(outside);
+  ASSERT_EQ(edges.size(), 2U);
+  EXPECT_NEAR(edges[0], 0.3, 1e-12);
+  EXPECT_NEAR(edges[1], 0.1, 1e-12);
+  EXPECT_EQ(by_edge(std::span(outside).first(4)).size(), 1U);
+  EXPECT_TRUE(by_edge({}).empty());
 }
 
 TEST(JointStructure, SeparatesAWrongResistanceFromAWrongSocAxis) {
