@@ -29,6 +29,7 @@
 #                  "heater fan soc_lamp"; also as -DBMS_INPUTS="coil_supply;crash"
 #   BMS_INSULATION  monitor: absent, pwm (PA6) or iso175 (CAN)
 #   BMS_SECOND_CURRENT  hall (PA1), or absent
+#   BMS_SLEEPS     true: the chip of a parked battery stops between the samples (hal/sleep.hpp)
 #   BMS_SWITCHES_OFF  true: an empty battery that nobody uses, or one of a workshop's command, switches itself off
 #                  (firmware/shelf.hpp); needs the input key, and the wiring of the board's page, or nothing wakes it
 #   BMS_CLOSES_BY_INPUTS  true: key and charger plug close the contactors without authority (docs/safety/threats.md)
@@ -48,7 +49,7 @@
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
-set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SWITCHES_OFF)
+set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SLEEPS SWITCHES_OFF)
 foreach(value ${of_pack_and_truck} ${of_inputs})
   if(DEFINED BMS_${value})
     set(wanted_${value} "${BMS_${value}}")  # OFF and an empty list are wishes, too
@@ -76,14 +77,14 @@ endif()
 list(REMOVE_ITEM BMS_INPUTS none)
 list(REMOVE_ITEM BMS_OUTPUTS none)
 set(may_stop false)
-if(BMS_SAMPLES STREQUAL "bq76952")
+if(BMS_SLEEPS AND BMS_SAMPLES STREQUAL "bq76952")
   set(may_stop true)
 endif()
 set(switches_off false)
 if(BMS_SWITCHES_OFF)
   if(NOT may_stop OR NOT "key" IN_LIST BMS_INPUTS)
-    message(FATAL_ERROR "BMS_SWITCHES_OFF needs BMS_SAMPLES bq76952 and key among BMS_INPUTS: without a key that is "
-      "read, a battery that is being used switches itself off")
+    message(FATAL_ERROR "BMS_SWITCHES_OFF needs BMS_SAMPLES bq76952, BMS_SLEEPS and key among BMS_INPUTS: without a "
+      "key that is read, a battery that is being used switches itself off")
   endif()
   set(switches_off true)
 endif()

@@ -18,19 +18,24 @@ using ::testing::IsEmpty;
 constexpr unsigned pack_state = 0x180;
 constexpr double asleep_share = 0.86;  ///< as the page of the board says
 
+Pack pack_with(const images::Choice& choice) {
+  Pack pack = pack_of(6);
+  pack.image = images::chosen_image("stm32f405_forklift", files::read_cell("table9"), choice);
+  return pack;
+}
+Pack pack_that_sleeps() { return pack_with({"sleeps", {"-DBMS_SLEEPS=ON"}}); }
+
 /// Wired to switch itself off, with a key that is read.
 Pack pack_that_switches_off() {
-  Pack pack = pack_of(6);
-  pack.image = images::chosen_image(
-      "stm32f405_forklift", files::read_cell("table9"),
-      {"switches_off", {"-DBMS_SWITCHES_OFF=ON", "-DBMS_INPUTS=key;charger_plug;coil_supply;interlock;crash"}});
-  return pack;
+  return pack_with(
+      {"switches_off",
+       {"-DBMS_SLEEPS=ON", "-DBMS_SWITCHES_OFF=ON", "-DBMS_INPUTS=key;charger_plug;coil_supply;interlock;crash"}});
 }
 
 /// Parked, with a silent bus, since so long that the chip stops between the samples.
 class Sleep : public ::testing::Test {
  protected:
-  explicit Sleep(const Pack& pack = pack_of(6)) : pack_(pack), world_(pack_.image, typical_setup(pack_)) {
+  explicit Sleep(const Pack& pack = pack_that_sleeps()) : pack_(pack), world_(pack_.image, typical_setup(pack_)) {
     world_.fit_clock();
     world_.run_ms(4'000);  // the crystal of the clock starts
     EXPECT_EQ(world_.board.stops, 0U) << "the truck's controller talks";
