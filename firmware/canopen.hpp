@@ -131,7 +131,7 @@ class Node {
     can::Frame answer{sdo_answer_id + id_, 8, {}};
     if (rest_.empty() || (request.data[0] & 0x10) != toggle_) {
       make_abort(answer, rest_.empty() ? AbortCode::unknown_command : AbortCode::toggle_not_alternated);
-      std::ranges::copy(object_, answer.data.begin() + 1);
+      if (!rest_.empty()) std::ranges::copy(object_, answer.data.begin() + 1);  // else there is no transfer to name
       rest_ = {};
     } else {
       const std::size_t sent = std::min<std::size_t>(rest_.size(), 7);
