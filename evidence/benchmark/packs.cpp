@@ -14,8 +14,8 @@
 #include "benchmark/pack_score.hpp"
 #include "benchmark/truth/case_files.hpp"
 #include "benchmark/truth/packs.hpp"
-#include "files/bad_input.hpp"
 #include "files/committed_figures.hpp"
+#include "files/run_program.hpp"
 #include "files/text_file.hpp"
 
 namespace {
@@ -91,15 +91,5 @@ int main(int argc, char** argv) {
   app.add_option("--readme", o.readme, "write the table between '<!-- figures: packs -->' and its end")
       ->type_name("FILE");
   app.add_option("--write", o.write, "write recordings and cell files to FOLDER")->type_name("FOLDER");
-  CLI11_PARSE(app, argc, argv);
-  try {
-    run(o);
-    return 0;
-  } catch (const bms::files::BadInput& error) {
-    fmt::print(stderr, "{}\n", error.what());
-    return 2;
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "packs: {}\n", error.what());
-    return 3;
-  }
+  return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

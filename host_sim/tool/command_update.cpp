@@ -28,17 +28,6 @@ struct UpdateOptions {
   Output output;
 };
 
-const char* words(UpdateResult::Outcome outcome) {
-  switch (outcome) {
-    case UpdateResult::Outcome::done:
-      return "done";
-    case UpdateResult::Outcome::returned:
-      return "returned";
-    default:
-      return "refused";
-  }
-}
-
 class UpdateCommand final : public Command {
  public:
   CLI::App* add(CLI::App& app) override {
@@ -81,7 +70,7 @@ class UpdateCommand final : public Command {
                                       {"seconds", result.seconds},
                                       {"bytes_sent", result.sent},
                                       {"resumed_at", result.resumed_at},
-                                      {"result", words(result.outcome)},
+                                      {"result", name_of(result.outcome)},
                                       {"reason", result.reason}};
     if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(2) + "\n");
     const bool done = result.outcome == UpdateResult::Outcome::done;
@@ -89,7 +78,7 @@ class UpdateCommand final : public Command {
       print_summary(o_.output, fmt::format("{}: {} runs, {} before; {} bytes in {:.1f} s\n", o_.source, result.to,
                                            result.from, result.sent, result.seconds));
     else
-      fmt::print(stderr, "{}: {}: {}\n", o_.source, words(result.outcome), result.reason);
+      fmt::print(stderr, "{}: {}: {}\n", o_.source, name_of(result.outcome), result.reason);
     return done ? 0 : 1;
   }
 

@@ -62,17 +62,6 @@ class Table {
   std::vector<Row> rows_;
 };
 
-const char* words(UpdateResult::Outcome outcome) {
-  switch (outcome) {
-    case UpdateResult::Outcome::done:
-      return "done";
-    case UpdateResult::Outcome::returned:
-      return "returned";
-    default:
-      return "refused";
-  }
-}
-
 void write_rows(const fs::path& out, const std::vector<TruckRow>& rows) {
   std::string text = std::string(columns) + "\n";
   for (const TruckRow& r : rows) {
@@ -141,7 +130,7 @@ std::vector<TruckRow> update_trucks(const std::vector<Truck>& trucks, const std:
       TruckRow row = rows[k];
       try {
         const UpdateResult result = update(trucks[k]);
-        row.state = words(result.outcome);
+        row.state = name_of(result.outcome);
         row.reason = result.reason;
         if (result.outcome == UpdateResult::Outcome::done)
           row.runs = result.to;

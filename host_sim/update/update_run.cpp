@@ -236,6 +236,17 @@ class Update {
 
 }  // namespace
 
+const char* name_of(UpdateResult::Outcome outcome) {
+  switch (outcome) {
+    case UpdateResult::Outcome::done:
+      return "done";
+    case UpdateResult::Outcome::returned:
+      return "returned";
+    default:
+      return "refused";
+  }
+}
+
 void Link::pump(int wait_ms) {
   can::Frame frame;
   while (transport_.next_frame(frame, now_us())) {

@@ -59,6 +59,9 @@ struct UpdateResult {
   std::uint32_t sent = 0, resumed_at = 0;  ///< bytes
 };
 
+/// As tables and JSON have it: done, refused, returned.
+const char* name_of(UpdateResult::Outcome outcome);
+
 /// Nothing if there is no battery with an update server.
 std::optional<BatteryState> read_state(Link& link);
 
