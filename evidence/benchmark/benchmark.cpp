@@ -91,6 +91,15 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
   json["split"] = options.split;
   json["seed"] = options.seed;
   json["first"] = options.first;
+  json["on"] = fmt::format("{} {}", options.split, options.seed);
+  for (const bms::benchmark::Figure& f : bms::benchmark::figures_of(bms::benchmark::score(columns.front().outcomes))) {
+    Json figure = {{"name", f.name}};
+    if (f.share.of > 0)
+      figure.update({{"hits", f.share.hits}, {"of", f.share.of}});
+    else
+      figure["value"] = f.value;
+    json["figures"].push_back(figure);
+  }
   for (const Column& c : columns) {
     Json& list = json["methods"][c.method] = Json::array();
     for (const Outcome& o : c.outcomes) {

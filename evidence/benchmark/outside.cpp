@@ -9,9 +9,11 @@
 
 #include <fmt/format.h>
 #include <CLI/CLI.hpp>
+#include <nlohmann/json.hpp>
 
 #include "benchmark/law_score.hpp"
 #include "files/run_program.hpp"
+#include "files/text_file.hpp"
 #include "numerics/in_parallel.hpp"
 
 namespace {
@@ -20,7 +22,7 @@ namespace truth = bms::benchmark::truth;
 using bms::benchmark::Outcome;
 
 struct Options {
-  std::string split, only;
+  std::string split, only, json;
   std::uint64_t seed = 1;
   std::size_t cases = 42, first = 0;
 };
@@ -38,6 +40,18 @@ std::string line_of(std::size_t index, const Outcome& o) {
       o.figures);
 }
 
+std::string json_of(const Options& options, const std::vector<Outcome>& outcomes) {
+  const bms::benchmark::LawScore s = bms::benchmark::law_score(outcomes);
+  const auto figure = [](const char* name, const bms::benchmark::Share& share) -> nlohmann::ordered_json {
+    return {{"name", name}, {"hits", share.hits}, {"of", share.of}};
+  };
+  const nlohmann::ordered_json json = {{"on", fmt::format("outside {} {}", options.split, options.seed)},
+                                       {"figures",
+                                        {figure("law of an unknown cause right", s.law),
+                                         figure("hold-out error above the floor halved by a learned term", s.cut)}}};
+  return json.dump(1) + "\n";
+}
+
 void run(const Options& options) {
   const truth::Split split = options.split == "final" ? truth::Split::final : truth::Split::development;
   std::vector<Outcome> outcomes(options.cases);
@@ -53,6 +67,7 @@ void run(const Options& options) {
   std::erase_if(outcomes, [](const Outcome& o) { return o.name.empty(); });
   fmt::print("\n{} split, seed {}, {} cases. In brackets: Wilson's 95 % interval.\n\n{}", options.split, options.seed,
              outcomes.size(), bms::benchmark::law_table(outcomes));
+  if (!options.json.empty()) bms::files::write_file(options.json, json_of(options, outcomes));
 }
 
 }  // namespace
@@ -67,5 +82,6 @@ int main(int argc, char** argv) {
   app.add_option("--cases", o.cases, "number of cases; effects follow each other in turn")->capture_default_str();
   app.add_option("--first", o.first, "index of the first case")->capture_default_str();
   app.add_option("--only", o.only, "run only effects whose name contains TEXT")->type_name("TEXT");
+  app.add_option("--json", o.json, "write the figures that have a target to FILE")->type_name("FILE");
   return bms::files::run_program(app, argc, argv, [&] { run(o); });
 }

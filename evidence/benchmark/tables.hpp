@@ -1,5 +1,5 @@
-// The tables of the benchmark as Markdown: every figure of every method next to its requirement, the classes that were
-// confused with each other, and detection over the strength of the effect.
+// The tables of the benchmark as Markdown: every figure of every method, the classes that were confused with each
+// other, and detection over the strength of the effect.
 #pragma once
 
 #include <cstdint>
@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "benchmark/run_case.hpp"
+#include "benchmark/score.hpp"
 
 namespace bms::benchmark {
 
@@ -15,6 +16,16 @@ struct Column {
   std::string method;
   std::vector<Outcome> outcomes;
 };
+
+/// A measured figure, named as in targets.toml where a target is stated: a share or, if it has no cases, a number.
+struct Figure {
+  std::string name;
+  Share share;
+  double value = 0;
+};
+
+/// Those for which there were cases.
+std::vector<Figure> figures_of(const Score& score);
 
 /// Shares as "hits of cases: share (Wilson's 95 % interval)"; "-" without cases.
 std::string figures_table(const std::vector<Column>& columns);
