@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <thread>
 
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
+#include "measurement/normal_distribution.hpp"
 #include "measurement/statistics.hpp"
 #include "model/ocv_voltage.hpp"
 
@@ -106,21 +106,11 @@ CutRun figures_of(const Errors& e, const std::optional<double>& knee_s) {
   return run;
 }
 
-/// Quantile of the standard normal distribution, 0 < p < 1.
-double normal_quantile(double p) {
-  double from = -9, to = 9;
-  for (int k = 0; k < 60; ++k) {
-    const double middle = 0.5 * (from + to);
-    (0.5 * std::erfc(-middle / std::numbers::sqrt2) < p ? from : to) = middle;
-  }
-  return 0.5 * (from + to);
-}
-
 /// In units of sigma. Neighbouring cuts get quantiles that lie far apart, since the SOC falls from cut to cut.
 double drawn_error(std::size_t cut, std::size_t cuts) {
   std::size_t stride = static_cast<std::size_t>(0.618 * static_cast<double>(cuts)) | 1;
   while (std::gcd(stride, cuts) != 1) ++stride;
-  return normal_quantile((static_cast<double>(cut * stride % cuts) + 0.5) / static_cast<double>(cuts));
+  return measurement::normal_quantile((static_cast<double>(cut * stride % cuts) + 0.5) / static_cast<double>(cuts));
 }
 
 std::optional<SocPrior> prior_of(const CutStart& start, std::size_t cut, std::size_t cuts, double reference) {

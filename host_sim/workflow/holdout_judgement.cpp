@@ -15,6 +15,7 @@
 #include "diagnosis/quantity_text.hpp"
 #include "diagnosis/texts.hpp"
 #include "identification/residuals.hpp"
+#include "measurement/normal_distribution.hpp"
 #include "workflow/next_steps.hpp"
 
 namespace bms::workflow {
@@ -121,7 +122,7 @@ double probability_of(std::span<const double> errors) {
   // the cube root of chi square over its degrees of freedom is nearly normal (Wilson and Hilferty 1931)
   const double variance = diagnosis::numerics.statistics.wilson_hilferty / independent,
                away = (std::cbrt(known.squaredNorm() / rows) - (1 - variance)) / std::sqrt(variance);
-  return std::erfc(away / std::sqrt(2)) / 2;
+  return measurement::normal_tail(away);
 }
 
 void judge_holdouts(const DiagnoseOptions& options, const diagnosis::Options& how, DiagnoseResult& r) {

@@ -9,6 +9,7 @@
 
 #include "diagnosis/numerics.hpp"
 #include "diagnosis/thresholds.hpp"
+#include "measurement/normal_distribution.hpp"
 
 namespace bms::diagnosis {
 
@@ -21,8 +22,6 @@ double student_tail(double t, double freedom) {
   const double half = 0.5 * Eigen::numext::betainc(freedom / 2, 0.5, freedom / (freedom + t * t));
   return t > 0 ? half : 1 - half;
 }
-
-double normal_tail(double deviations) { return 0.5 * std::erfc(deviations / std::sqrt(2.0)); }
 
 /// Probability that one more value of a normal sample of n lies so many of its standard deviations above its mean. The
 /// standard deviation has a prior that counts as so many more values.
@@ -97,9 +96,7 @@ double HealthyNull::log_ratio(const std::string& cause, double gain) const {
 double log_spread_beyond(double covered) { return (1 - covered) * healthy_limits.log_spread_beyond; }
 
 double error_factor(double covered, double rate) {
-  double deviations = 0;
-  while (normal_tail(deviations) > rate) deviations += numerics.search.gain_step;
-  return std::exp(0.5 * deviations * log_spread_beyond(covered));
+  return std::exp(0.5 * measurement::normal_quantile(1 - rate) * log_spread_beyond(covered));
 }
 
 HealthyComparison HealthyNull::compare(const std::string& cause, double gain, double covered) const {
@@ -112,7 +109,8 @@ HealthyComparison HealthyNull::compare(const std::string& cause, double gain, do
   bool exceeds_all = true;
   for (const double level : level_of_block_) {
     exceeds_all = exceeds_all && level < ratio;
-    as_extreme += elsewhere > 0 ? normal_tail((ratio - level) / elsewhere) : static_cast<double>(level >= ratio);
+    as_extreme +=
+        elsewhere > 0 ? measurement::normal_tail((ratio - level) / elsewhere) : static_cast<double>(level >= ratio);
   }
   c.false_alarm = (1 + as_extreme) / (n + 1);
   if (exceeds_all && n >= healthy_limits.blocks_at_least)

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "measurement/normal_distribution.hpp"
+
 namespace bms::measurement {
 namespace {
 
@@ -34,6 +36,14 @@ TEST(Statistics, WithoutValuesThereIsNoMedianAndTheRmsIsZero) {
   EXPECT_TRUE(std::isnan(median<double>({})));
   EXPECT_TRUE(std::isnan(quantile<double>({missing}, 0.5)));
   EXPECT_EQ(rms({}), 0);
+}
+
+TEST(NormalDistribution, HasTheValuesOfItsTables) {
+  EXPECT_NEAR(normal_quantile(0.975), 1.959964, 1e-6);
+  EXPECT_NEAR(normal_quantile(0.01), -2.326348, 1e-6);
+  EXPECT_NEAR(normal_quantile(0.5), 0, 1e-9);
+  EXPECT_NEAR(normal_tail(1.281552), 0.1, 1e-6);
+  EXPECT_NEAR(normal_tail(-2), 0.977250, 1e-6);
 }
 
 }  // namespace

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 
 #include "diagnosis/pack/pack_thresholds.hpp"
+#include "measurement/normal_distribution.hpp"
 #include "measurement/statistics.hpp"
 
 namespace bms::diagnosis::pack {
@@ -35,12 +35,8 @@ double usual_share(std::size_t cells) {
 
 /// The square of the quantile of |x|, x standard normal.
 double square_of_quantile(double share) {
-  double low = 0, high = limits.widest_quantile;
-  while (high - low > limits.quantile_accuracy) {
-    const double middle = (low + high) / 2;
-    (std::erf(middle / std::numbers::sqrt2) < share ? low : high) = middle;
-  }
-  return low * low;
+  const double quantile = measurement::normal_quantile((1 + share) / 2);
+  return quantile * quantile;
 }
 
 }  // namespace

@@ -56,7 +56,6 @@ struct PackThresholds {
   double seconds_per_hour = 3'600;
   double most_spread = 12;                          ///< of the spread that a pack may show, over that of healthy cells
   double outlying_share = 0.2, outlying_cells = 4;  ///< so many cells of a pack may be faulty in one parameter
-  double widest_quantile = 4, quantile_accuracy = 1e-4;  ///< of the search for a quantile of the normal distribution
   double hours_per_day = 24;
   std::size_t smooth_rows = 7;  ///< before and after, whose mean difference to the model is taken
   double instant_rows = 30;     ///< differences to the model that last longer are not steps within a row
