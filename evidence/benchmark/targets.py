@@ -19,10 +19,11 @@ import sys
 import tomllib
 
 HERE = pathlib.Path(__file__).resolve().parent
+ROOT = HERE.parents[1]
 MEASURED = HERE / "measured.json"
 REAL = "real: "  # begins the names of figures of real cells
 TABLES = ((HERE / "README.md", "targets", ""),  # file, its mark, what the names begin with
-          (HERE.parents[1] / "inference/diagnosis/README.md", "real cells", REAL))
+          (ROOT / "inference/diagnosis/README.md", "real cells", REAL))
 
 # Counts in the results of the programs for real recordings: figure, hits, cases
 COUNTS = (
@@ -73,7 +74,7 @@ def keep(o):
     on = o.on or result.get("on")
     if not on:
         fail(f"{o.result}:1: does not say on which cases, expected --on")
-    if git("status", "--porcelain", "--untracked-files=no"):
+    if git("status", "--porcelain", "--untracked-files=no", "--", ":/", f":(exclude,top){MEASURED.relative_to(ROOT)}"):
         fail("not everything is committed: the commit would not be that of the figures")
     known = {t["name"] for t in targets()}
     kept = [m for m in measured() if (m["name"], m["on"]) not in {(f["name"], on) for f in figures_of(result)}]
