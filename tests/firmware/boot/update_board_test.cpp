@@ -22,7 +22,8 @@ using Operation = firmware::FlashControllerModel::Operation;
 using Stored = firmware::FlashControllerModel;
 using ::testing::IsEmpty;
 
-constexpr std::uint32_t one_time_begin = 0x1FFF'7800, one_time_bytes = 32, by_power = 1U << 27 | 1U << 26 | 1U << 25;
+/// Block 1 of the one-time programmable memory; block 0 has the device key.
+constexpr std::uint32_t one_time_begin = 0x1FFF'7820, one_time_bytes = 32, by_power = 1U << 27 | 1U << 26 | 1U << 25;
 
 /// All flash of the chip but the loader's.
 struct Contents {
@@ -31,9 +32,13 @@ struct Contents {
   std::vector<std::uint8_t> one_time = std::vector<std::uint8_t>(one_time_bytes, 0xFF);
 
   std::span<std::uint8_t> place(const Operation& o) {
-    if (o.address >= one_time_begin) return std::span(one_time).subspan(o.address - one_time_begin, o.bytes);
-    if (o.address >= application_slots[0]) return std::span(slots).subspan(o.address - application_slots[0], o.bytes);
-    return std::span(stored).subspan(o.address - Stored::memory, o.bytes);
+    if (o.address >= one_time_begin) return part_of(one_time, o.address - one_time_begin, o.bytes);
+    if (o.address >= application_slots[0]) return part_of(slots, o.address - application_slots[0], o.bytes);
+    return part_of(stored, o.address - Stored::memory, o.bytes);
+  }
+  static std::span<std::uint8_t> part_of(std::vector<std::uint8_t>& of, std::size_t at, std::size_t bytes) {
+    if (at + bytes > of.size()) throw std::out_of_range("an operation outside of the flash that this test knows");
+    return std::span(of).subspan(at, bytes);
   }
   void apply(const Operation& o) {
     const auto bytes = place(o);
@@ -315,6 +320,9 @@ class Cuts {
     const bool confirmed = k >= the_update().confirmed_at;
     EXPECT_TRUE(runs == 1 || !confirmed) << when_ << ": older than what was confirmed";
     expect_nothing_lost(battery_.board.flash.bytes, charges_, when_);
+    // Both images have the security version 1, and the first one has confirmed itself before the update.
+    EXPECT_EQ(battery_.board.read_flash(one_time_begin, 4), (std::vector<std::uint8_t>{0xFE, 0xFF, 0xFF, 0xFF}))
+        << when_;
     return runs;
   }
 
