@@ -80,7 +80,7 @@ boot = [f"firmware/boot/{name}.cpp" for name in ("iso_tp", "receiver", "slots", 
 programs_of_boot = [
     ("tests/firmware/boot/crypto_test.cpp", "boot_test", ["firmware/boot/crypto_mbedtls.cpp"]),
     *((f"tests/firmware/boot/{name}_test.cpp", "boot_test", ["tests/firmware/storage/flash_model.cpp", *boot])
-      for name in ("iso_tp", "slots", "receiver", "memory_of_the_chip", "update_services", "update_server",
+      for name in ("container", "iso_tp", "slots", "receiver", "memory_of_the_chip", "update_services", "update_server",
                    "update_power_cut")),
 ]
 part_option = argparse.ArgumentParser(add_help=False)
@@ -92,7 +92,7 @@ if part == "boot":
 first = {
     "table_text": "table_test", "faults": "table_test", "pack_design": "table_test",
     "fault_monitor": "fault_matrix_test", "guarded": "contactor_walk_test", "crc32": "records_test",
-    "log_line": "log_test", "container": "receiver_test", "verify": "receiver_test", "refusal": "receiver_test",
+    "log_line": "log_test", "verify": "receiver_test", "refusal": "container_test",
     "slot_flash": "slots_test", "crypto_mbedtls": "crypto_test", "handover": "memory_of_the_chip_test",
     "key_table": "memory_of_the_chip_test", "flash_map": "memory_of_the_chip_test",
     "update_server": "update_services_test",

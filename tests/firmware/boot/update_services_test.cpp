@@ -9,27 +9,6 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-/// Slots of an image that cannot erase, because its code is in the same bank.
-class SlotsOfAnImage final : public SlotFlash {
- public:
-  explicit SlotsOfAnImage(SlotFlash& chip) : chip_(chip) {}
-  std::uint32_t slot_bytes() const override { return chip_.slot_bytes(); }
-  bool erases_now() const override { return may_erase; }
-  bool erase(std::uint8_t slot) override { return may_erase && chip_.erase(slot); }
-  bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
-    return chip_.program(slot, at, word);
-  }
-  void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override { chip_.read(slot, at, into); }
-  std::uint32_t one_time(std::uint32_t word) override { return chip_.one_time(word); }
-  bool program_one_time(std::uint32_t word, std::uint32_t value) override {
-    return chip_.program_one_time(word, value);
-  }
-  bool may_erase = true;
-
- private:
-  SlotFlash& chip_;
-};
-
 class UpdateServices : public ::testing::Test, public UpdateSurroundings {
  protected:
   void SetUp() override {
