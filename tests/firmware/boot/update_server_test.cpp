@@ -212,8 +212,8 @@ TEST_F(UpdateServerTest, ATransferInDriveIsRefusedAndNothingChanges) {
   EXPECT_EQ(battery_.bench().flash().bytes(1), before);
 }
 
-/// Before its first sample a battery does not know that it rests. A refusal right after the restart that erases is no
-/// drive.
+/// Before its first sample a battery does not know that it rests. A refusal right after the restart that erases
+/// does not mean a drive.
 TEST_F(UpdateServerTest, ABatteryThatRestartsToEraseIsWaitedForUntilItHasMeasured) {
   auto earlier = wish({.slot = 1, .version = 0x000250, .security_version = 5, .seed = 11});
   battery_.frames_until_lost = 1'200;
