@@ -20,6 +20,7 @@ constexpr std::size_t piece_bytes = 1'024;
 constexpr int most_tries = 5;
 constexpr std::size_t earliest_state_bytes = 24;          // without the time since the start
 constexpr std::chrono::seconds longest_until_restart{3};  // a sample, and the state that is stored before
+constexpr std::chrono::seconds longest_until_sample{10};  // after a start
 constexpr std::uint8_t negative = 0x7F, pending = 0x78;
 
 std::uint64_t now_us() {
@@ -144,10 +145,23 @@ class Update {
     return big(expect(ask), 4, 4);
   }
 
+  /// After its start a battery does not know that it rests before its first sample.
+  Bytes expect_at_rest(const Bytes& message) {
+    for (const auto end = Clock::now() + longest_until_sample;;) {
+      try {
+        return expect(message, 10'000);
+      } catch (const Refused& refused) {
+        if (refused.reason != boot::words_for(boot::Refusal::not_at_rest) || Clock::now() > end) throw;
+      }
+      link_.request({0x3E, 0x80}, 200);  // has no answer, and keeps the session
+    }
+  }
+
   /// A battery that protects cannot erase: it restarts, its loader erases, and the request is repeated.
   void erase() {
+    const Bytes ask{0x31, 0x01, 0xFF, 0x00};
     for (int tries = 0; tries < 2; ++tries) {
-      if (expect({0x31, 0x01, 0xFF, 0x00}, 10'000).at(4) == 0) return;
+      if ((tries == 0 ? expect(ask, 10'000) : expect_at_rest(ask)).at(4) == 0) return;
       const auto end = Clock::now() + std::chrono::seconds(20);
       auto back = read_state(link_);
       while (!back && Clock::now() < end) back = read_state(link_);

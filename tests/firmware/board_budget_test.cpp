@@ -8,7 +8,9 @@
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
 #include "images/firmware_image.hpp"
+#include "images/image_file.hpp"
 #include "tests/firmware/board_budget.hpp"
+#include "tests/firmware/elf_image.hpp"
 #include "tests/firmware/stack_depth.hpp"
 
 namespace bms::firmware {
@@ -46,6 +48,23 @@ TEST(ForkliftBudgets, Are96KilobytesOfFlashAnd16OfRam) {
   const BoardBudget b = budget_of("stm32f405_forklift");
   EXPECT_EQ(b.flash, 96U * 1024);
   EXPECT_EQ(b.ram, 16U * 1024);
+}
+
+/// What receives an update takes 9 KB of RAM and 2 KiB of stack, for one header. The chip has 128 KiB of RAM and the
+/// stack apart from it; the budgets of board.cmake are those of an image without a slot.
+TEST(ForkliftBudgets, OfAnImageInASlotAre20KilobytesOfRamAndTheStackAboveItsGuard) {
+  const auto image =
+      images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::remote_slot_a);
+  const ImageSize size = size_of(image);
+  const images::ImageFile file(image);
+  const std::uint32_t stack = file.symbol("image_stack_top") - file.symbol("image_stack_limit") - 1'024,
+                      worst = stack_depth(image).worst();
+  std::printf("in a slot: %zu bytes of flash, %zu of RAM, at worst %u of %u of stack\n",
+              static_cast<std::size_t>(size.text + size.data), static_cast<std::size_t>(size.data + size.bss), worst,
+              stack);
+  EXPECT_LE(size.text + size.data, 112U * 1024);
+  EXPECT_LE(size.data + size.bss, 20U * 1024);
+  EXPECT_LE(worst, stack);
 }
 
 // instructions as objdump prints them

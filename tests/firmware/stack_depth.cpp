@@ -206,11 +206,16 @@ class Deepest {
 };
 
 /// Calls by pointer in the images: constructors from reset, who listens for updates (an image without a slot has
-/// nobody), and the switch tables of libgcc, which return into their caller.
+/// nobody), the surroundings of the update server, and the switch tables of libgcc, which return into their caller.
 const ByPointer& calls_by_pointer() {
-  static const ByPointer known = {{"reset_handler", {"_GLOBAL__sub_I_"}},
-                                  {"bms::hal::dispatch_frame", {"bms::firmware::UpdateService::receive"}},
-                                  {"__gnu_thumb1_case_", {}}};
+  static const ByPointer known = {
+      {"reset_handler", {"_GLOBAL__sub_I_"}},
+      {"bms::hal::dispatch_frame", {"bms::firmware::UpdateService::receive"}},
+      {"mbedtls_platform_zeroize", {"memset"}},
+      {"bms::boot::",
+       {"bms::boot::ChipSlots::", "bms::boot::check_fields_and_key(", "bms::firmware::UpdateService::at_rest",
+        "bms::firmware::UpdateService::challenge", "bms::firmware::UpdateService::restart("}},
+      {"__gnu_thumb1_case_", {}}};
   return known;
 }
 

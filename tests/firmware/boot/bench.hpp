@@ -56,6 +56,27 @@ class ModelSlots final : public SlotFlash {
   FlashModel* model_;
 };
 
+/// Slots of an image that cannot erase, because its code is in the same bank.
+class SlotsOfAnImage final : public SlotFlash {
+ public:
+  explicit SlotsOfAnImage(SlotFlash& chip) : chip_(chip) {}
+  std::uint32_t slot_bytes() const override { return chip_.slot_bytes(); }
+  bool erases_now() const override { return may_erase; }
+  bool erase(std::uint8_t slot) override { return may_erase && chip_.erase(slot); }
+  bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
+    return chip_.program(slot, at, word);
+  }
+  void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override { chip_.read(slot, at, into); }
+  std::uint32_t one_time(std::uint32_t word) override { return chip_.one_time(word); }
+  bool program_one_time(std::uint32_t word, std::uint32_t value) override {
+    return chip_.program_one_time(word, value);
+  }
+  bool may_erase = true;
+
+ private:
+  SlotFlash& chip_;
+};
+
 struct ImageWish {
   std::uint8_t slot = 0;
   std::uint32_t version = 0x000200, security_version = 1, bytes = 9'000, seed = 1;

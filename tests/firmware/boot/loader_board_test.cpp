@@ -44,6 +44,23 @@ TEST(LoaderBoard, StartsTheConfirmedImageWithin300Ms) {
   EXPECT_THAT(battery.board.rcc.violations, IsEmpty());
 }
 
+std::uint64_t instructions_to_start(std::size_t payload_bytes) {
+  LoaderBoard battery(1, container(0, 0x000200, [&](std::string& payload, auto) { payload.resize(payload_bytes); }));
+  EXPECT_TRUE(battery.board.run_until([&] { return battery.running() != 2; }, 2'000));
+  return battery.board.instructions;
+}
+
+/// A start without a payload is the signature and little else; the hashes add a part in proportion to the image, of
+/// which a slot has room for 222 KiB.
+TEST(LoaderBoard, AlsoTheLargestImageWouldStartWithin300Ms) {
+  const std::uint64_t small = instructions_to_start(8'192), large = instructions_to_start(73'728);
+  const double each_kib = static_cast<double>(large - small) / 64, without = static_cast<double>(small) - 8 * each_kib;
+  std::printf("a start: %.1f M instructions for the signature and the rest, %.0f for each KiB of the image\n",
+              1e-6 * without, each_kib);
+  EXPECT_LT(without + 222 * each_kib, 0.3 * 168e6);
+  EXPECT_GT(each_kib, 1'024) << "no byte is hashed in less than an instruction";
+}
+
 TEST(LoaderBoard, AHealthyImageConfirmsItselfAndStays) {
   LoaderBoard battery;
   battery.board.longest_sleep_us = 500;

@@ -87,6 +87,16 @@ TEST_F(ReceiverTest, RefusesEachBadHeaderForItsOwnReasonBeforeAWordIsWritten) {
   }
 }
 
+/// A leaked development key makes no product's image, not even for a battery that runs development images.
+TEST_F(ReceiverTest, OfADevelopmentKeyOnlyDevelopmentImagesAreAccepted) {
+  bench_.battery().product = false;
+  auto wish = update();
+  wish.key = "development";
+  EXPECT_EQ(offer(image(wish)), Refusal::development_image);
+  wish.development = true;
+  EXPECT_EQ(offer(image(wish)), Refusal::none);
+}
+
 TEST_F(ReceiverTest, RefusesTheReleaseThatRunsAlready) {
   // one file, linked for both slots
   const auto both = sign({payload_of({.slot = 0, .security_version = 6, .seed = 3}),

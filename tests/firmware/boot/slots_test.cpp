@@ -110,6 +110,12 @@ TEST_F(SlotsTest, TheCounterOnlyRises) {
   }
 }
 
+TEST_F(SlotsTest, AnImageAboveTheLargestCounterRevokesNoKey) {
+  EXPECT_TRUE(raise_security_counter(bench_.slots(), 240));
+  EXPECT_EQ(security_counter(bench_.slots()), 224U);
+  EXPECT_EQ(bench_.slots().one_time(revocation_word), ~0U);
+}
+
 TEST_F(SlotsTest, ARevokedKeyIsABitOfTheLastWord) {
   EXPECT_FALSE(key_revoked(bench_.slots(), 0));
   bench_.slots().program_one_time(revocation_word, ~2U);

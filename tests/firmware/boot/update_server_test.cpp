@@ -26,6 +26,8 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   bool states_its_time = true;     ///< since its start; the first update server does not
   int states_lost = 0;             ///< so many answers about its state, once the image is complete
   int frames_until_lost = -1;      ///< then the connection is lost once
+  bool erases_itself = true;       ///< otherwise its loader does, at a restart
+  int asked_before_a_sample = 0;   ///< so often after a start it does not know yet that it rests
   Bench& bench() { return bench_; }
   const UpdateServer& server() const { return *server_; }
 
@@ -65,9 +67,10 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
         std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - started_at_).count());
   }
   // UpdateSurroundings
-  bool at_rest() override { return rest; }
+  bool at_rest() override { return unmeasured_-- <= 0 && rest; }
   std::uint64_t challenge() override { return ++challenge_; }
   void restart() override {
+    unmeasured_ = asked_before_a_sample;
     if (requests_until_restart == 0) start(false);
     restart_in_ = requests_until_restart;
   }
@@ -79,7 +82,10 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
     } else if (started_.trial) {
       started_ = bench_.reset(false);  // its watchdog
     }
-    server_ = std::make_unique<UpdateServer>(bench_.slots(), bench_.battery(), started_,
+    slots_.may_erase = true;
+    if (started_.found) erase_if_asked(slots_, static_cast<std::uint8_t>(1 - started_.slot));
+    slots_.may_erase = erases_itself;
+    server_ = std::make_unique<UpdateServer>(slots_, bench_.battery(), started_,
                                              authentication::role_key(device, authentication::Role::service), *this);
     next_node_ = std::make_unique<UpdateNode>(*server_, *this);
     node_.swap(next_node_);                                               // the old one may be the caller
@@ -87,12 +93,13 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
   }
 
   Bench bench_;
+  SlotsOfAnImage slots_{bench_.slots()};
   Start started_;
   std::unique_ptr<UpdateServer> server_;
   std::unique_ptr<UpdateNode> node_, next_node_;
   std::uint64_t challenge_ = 41;
   Clock::time_point started_at_{};
-  int restart_in_ = 0;
+  int restart_in_ = 0, unmeasured_ = 0;
   bool lost_ = false, complete_ = false;
 };
 
@@ -203,6 +210,21 @@ TEST_F(UpdateServerTest, ATransferInDriveIsRefusedAndNothingChanges) {
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.reason, words_for(Refusal::not_at_rest));
   EXPECT_EQ(battery_.bench().flash().bytes(1), before);
+}
+
+/// Before its first sample a battery does not know that it rests. A refusal right after the restart that erases
+/// does not mean a drive.
+TEST_F(UpdateServerTest, ABatteryThatRestartsToEraseIsWaitedForUntilItHasMeasured) {
+  auto earlier = wish({.slot = 1, .version = 0x000250, .security_version = 5, .seed = 11});
+  battery_.frames_until_lost = 1'200;
+  EXPECT_EQ(run(earlier).outcome, Outcome::refused);
+  battery_.connect_again();
+  ASSERT_FALSE(read_marks(battery_.bench().slots(), 1).erased) << "nothing was written";
+  battery_.erases_itself = false;
+  battery_.power_cut();
+  battery_.asked_before_a_sample = 3;
+  const auto result = run(wish());
+  EXPECT_EQ(result.outcome, Outcome::done) << result.reason;
 }
 
 TEST_F(UpdateServerTest, ADriveDuringATransferPausesItAndItIsResumedAtRest) {

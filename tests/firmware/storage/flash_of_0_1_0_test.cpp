@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "tests/firmware/storage/flash_after_0_1_0.hpp"
 #include "tests/firmware/storage/persistence_bench.hpp"
 
 namespace bms {
@@ -59,6 +60,30 @@ TEST_F(PersistenceTest, ReadsWhatVersion010HasStored) {
   boot(ResetCause::power_on);
   EXPECT_EQ(p.charge().operating_s, 157U * 60);
   EXPECT_EQ(p.events().faults, 3U);
+}
+
+/// A battery went back to 0.1.0 for half an hour. 0.2.0: two settings, an action of a session, 40 min at -6 A from 70 %
+/// on, fault 12. 0.1.0: 30 min at 6 A and -6 A in turn, fault 33, another setting. Charge, counters and settings go on
+/// through both; what 0.1.0 does not know is there afterwards. Its faults are the newest; it has begun a list of its
+/// own.
+TEST_F(PersistenceTest, AStayOfVersion010LosesNeitherChargeNorSettingsNorActions) {
+  for (std::uint32_t sector = 0; sector < tests::flash_after_0_1_0.size(); ++sector)
+    flash.fill(sector, bytes_of(tests::flash_after_0_1_0[sector]));
+  boot(ResetCause::power_on);
+  EXPECT_EQ(p.newer_records(), 0U);
+  EXPECT_EQ(p.charge().pack.soc_ppb, 62 * percent_ppb);
+  EXPECT_EQ(p.charge().charged_uah, 1'500'000U);
+  EXPECT_EQ(p.charge().discharged_uah, 5'500'000U);
+  EXPECT_EQ(p.charge().operating_s, 70U * 60);
+  ASSERT_EQ(p.cells().count, 16);
+  EXPECT_EQ(p.cells().cell[15].soc, 700);
+  EXPECT_EQ(p.health(), (storage::HealthRecord{930'000, 20'000, 1'210'000, 60'000}));
+  EXPECT_EQ(p.settings().get(1), 1'800);
+  EXPECT_EQ(p.settings().get(7), -42);
+  EXPECT_EQ(p.settings().get(9), 77);
+  EXPECT_EQ(p.actions().last(0).code, 3);
+  EXPECT_EQ(p.actions().last(0).operator_number, 42);
+  EXPECT_EQ(p.events().last(0).code, 33);
 }
 
 }  // namespace
