@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -231,7 +230,7 @@ class Update {
         throw Refused{"the battery has not restarted: the image is complete and starts at its next restart"};
       if (now && restarted && !now->trial && !of_cell()) return decide(*now);
       if (restarted && cell && !cell->trial) return decide(*cell);
-      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      wish_.pause();
     }
     throw Refused{restarted ? "the new image was started and has not confirmed itself yet"
                             : "the battery does not answer after its restart"};

@@ -2,11 +2,13 @@
 // waits for what the battery says afterwards. Services: firmware/boot/update_server.hpp.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "authentication/codes.hpp"
@@ -61,6 +63,8 @@ struct UpdateWish {
   std::uint16_t operator_number = 0;
   double start_wait_s = 90;   ///< for the new image to confirm itself
   double restart_wait_s = 3;  ///< a sample, and the state that is stored before
+  /// Between two questions whether the trial is over.
+  std::function<void()> pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(200)); };
   std::function<void(std::uint32_t done, std::uint32_t of)> progress = [](std::uint32_t, std::uint32_t) {};
 };
 
