@@ -47,7 +47,7 @@ extern const BoardTables* tables_of_update;
 /// Hash of the cell file that acts.
 extern std::uint32_t acting_cell_hash;
 
-/// The estimator step with them, which costs one instruction in seven more: they are not constants.
+/// The estimator step with them. A function of its own: for that of the build, the tables are constants.
 BoardEstimator::Result step_of_update(BoardEstimator& estimator, const measurement::Sample& sample);
 
 inline const BoardTables& tables() {
