@@ -4,7 +4,7 @@
 #
 # It does not depend on the cell file. BMS_LOADER_VERSION is its own version: 0xMMMMmmpp.
 include(${root}/cmake/mbedtls.cmake)
-set(BMS_LOADER_VERSION 0x00000100)
+set(BMS_LOADER_VERSION 0x00000200)
 
 set(slot_hal ${chip}/slot_flash.cpp ${chip}/start_image.cpp)
 if(BMS_EMULATED)

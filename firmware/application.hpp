@@ -67,7 +67,7 @@ class Application {
         capacity_ah_{capacity_ah},
         persistence_{persistence},
         access_{persistence},
-        cell_hash_{identity.cell_hash} {
+        cell_hash_{hash_of_stored_data<Board>(identity.cell_hash)} {
     board_.cell_file_changed = stored_for_another_cell_file(persistence, cell_hash_);
     if (board_.cell_file_changed) return;
     store_setting(cell_file_key, cell_hash_);
@@ -112,7 +112,7 @@ class Application {
     if (progress_.complete({pack.time_us, Board::estimated_us(estimator_), telemetry_.published()}))
       hal::watchdog_feed();
     serve_update<Board>(
-        pack, inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
+        pack, estimate, inputs.request == protection::Request::none && !protection_.decision().outputs.any_closed(),
         !board_.state.unfit() && !setting_lost_ && persistence_.log().operational(), [&] { shut_down(); });
     if constexpr (requires { requires Board::may_stop; }) {
       if (!truck_.park(pack, inputs, charger, protection_.decision(), board_, Board::plan())) return;

@@ -2,21 +2,22 @@
 #include "firmware/board_cell.hpp"
 
 #include "firmware/board_pack.hpp"
+#include "firmware/board_tables.hpp"
 
 namespace bms::firmware {
 
 void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                  const measurement::Sample& sample, const Estimator::Result& estimate,
                                  bool limits_wanted) {
-  condition.update(generated::cell<BoardScalar>, sample, estimate, estimator.state(), limits_wanted);
+  condition.update(tables(), sample, estimate, estimator.state(), limits_wanted);
 }
 
 void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differences,
                              const measurement::PackSample<cells>& pack, const Estimator::Result& estimate) {
-  differences.update(generated::cell<BoardScalar>, pack, estimate);
+  differences.update(tables(), pack, estimate);
 }
 
-const model::PlausibleRange& BoardCell::plausible() { return generated::cell<BoardScalar>.plausible; }
+const model::PlausibleRange& BoardCell::plausible() { return tables().plausible; }
 
 const protection::ProtectionPlan& BoardCell::plan() {
   static_assert(!hal::truck_stated || possible_truck(board_pack),

@@ -1,4 +1,5 @@
 #include "firmware/board_cell.hpp"
+#include "firmware/board_tables.hpp"
 
 /// Identifies the cell file of an image without running it. On CAN the message Identity has the same value.
 extern "C" {
@@ -10,11 +11,20 @@ namespace bms::firmware {
 
 // flatten: with everything inline the cell is a constant, which saves one instruction in seven
 [[gnu::flatten]] BoardEstimator::Result estimator_step(BoardEstimator& estimator, const measurement::Sample& sample) {
-  return estimator.step(generated::cell<BoardScalar>, sample);
+  if constexpr (BMS_IN_SLOT) {
+    return tables_of_update != nullptr ? step_of_update(estimator, sample) : estimator.step(tables_of_build, sample);
+  } else {
+    return estimator.step(generated::cell<BoardScalar>, sample);
+  }
 }
 
 float capacity_ah() { return static_cast<float>(generated::parameters.capacity_ah); }
 
-messages::Identity identity() { return {.cell_hash = image_cell_hash, .version = BMS_VERSION}; }
+messages::Identity identity() {
+  if constexpr (BMS_IN_SLOT)
+    return {.cell_hash = acting_cell_hash, .version = BMS_VERSION};
+  else
+    return {.cell_hash = image_cell_hash, .version = BMS_VERSION};
+}
 
 }  // namespace bms::firmware

@@ -70,8 +70,9 @@ int main() {
   if (sample == nullptr) return 0;
   const auto given_start = hal::starting_point();
   static BoardApplication application(
-      given_start ? given_start : stored_starting_point(persistence, identity().cell_hash), identity(), capacity_ah(),
-      persistence);
+      given_start ? given_start
+                  : stored_starting_point(persistence, hash_of_stored_data<BoardCell>(identity().cell_hash)),
+      identity(), capacity_ah(), persistence);
   running = &application;
   for (; sample != nullptr; sample = hal::next_sample()) application.process_sample(*sample, hal::acquisition_us());
   application.shut_down();

@@ -13,12 +13,13 @@ namespace {
 
 static_assert(hal::update_frame_id == boot::update_request_id);
 
-boot::Handover read_handover() {
-  boot::Handover h;
-  const auto* from = reinterpret_cast<const volatile std::uint8_t*>(boot::handover_address);
-  auto* to = reinterpret_cast<std::uint8_t*>(&h);
-  for (std::size_t k = 0; k < sizeof h; ++k) to[k] = from[k];
-  return h;
+template <class Message>
+Message message_at(std::uint32_t address) {
+  Message m;
+  const auto* from = reinterpret_cast<const volatile std::uint8_t*>(address);
+  auto* to = reinterpret_cast<std::uint8_t*>(&m);
+  for (std::size_t k = 0; k < sizeof m; ++k) to[k] = from[k];
+  return m;
 }
 
 /// The key of the sessions. A product without a key of its own opens none: a key that nobody knows.
@@ -41,7 +42,7 @@ UpdateService& UpdateOfBoard<true>::update() {
 void UpdateOfBoard<true>::restart() { hal::restart(); }
 
 void UpdateService::start(std::uint32_t starts, std::uint32_t operating_s) {
-  const boot::Handover handover = read_handover();
+  const auto handover = message_at<boot::Handover>(boot::handover_address);
   const auto started = boot::start_of(handover);
   if (!started) return;  // no loader has started this image: it runs alone
   started_ = *started;
@@ -50,9 +51,34 @@ void UpdateService::start(std::uint32_t starts, std::uint32_t operating_s) {
   battery_ = boot::chip_battery(BMS_BOARD, *keys_, slots_, handover.loader_version);
   const auto device = hal::device_key();
   challenges_.emplace(device.value_or(authentication::Key{}), starts, operating_s);
-  server_.emplace(slots_, battery_, started_, service_key(device), *this, boot::check_fields_and_key);
+  const auto cell = boot::start_of(message_at<boot::CellHandover>(boot::cell_handover_address));
+  std::optional<boot::CellSlots> cells;
+  if (cell) {  // a loader that starts cell constants
+    cell_ = *cell;
+    cell_battery_ = boot::for_cells(battery_, cells_, firmware::cell_hash_of_build());
+    cell_battery_.content = check_cell_constants;
+    cells.emplace(cells_, cell_battery_, cell_);
+  }
+  server_.emplace(slots_, battery_, started_, service_key(device), *this, boot::check_fields_and_key, cells);
+  if (cell_.found) use_cell();
   node_.emplace(*server_, *this);
   hal::listen_for_updates(+[](const can::Frame& frame) { UpdateOfBoard<true>::update().receive(frame); });
+}
+
+/// What the loader has checked still has to be constants that this application can use.
+void UpdateService::use_cell() {
+  boot::HeaderBytes header{};
+  cells_.read(cell_.slot, 0, header);
+  boot::Header h;
+  boot::Refusal refusal = boot::check_fields_and_key(header, cell_battery_, cell_.slot, h);
+  if (refusal == boot::Refusal::none) {
+    const auto bytes = server_->room().first(h.payload_bytes);
+    cells_.read(cell_.slot, boot::header_bytes, bytes);
+    refusal = use_cell_constants(bytes, h.cell_hash);
+  }
+  if (refusal == boot::Refusal::none) return;
+  cell_.found = cell_.trial = false;
+  server_->cell_refused(refusal);
 }
 
 std::uint64_t UpdateService::challenge() { return challenges_->next(hal::now_us()); }
@@ -77,8 +103,8 @@ bool UpdateService::restart_due(const Health& health) {
     restart_wanted_ = false;
     return at_rest_;
   }
-  if (trial_) judge_trial(health);
-  if (trial_ && health.now_us - first_us_ > longest_trial_us) return true;
+  if (on_trial()) judge_trial(health);
+  if (on_trial() && health.now_us - first_us_ > longest_trial_us) return true;
   send_waiting(hal::now_us());
   return false;
 }
@@ -90,9 +116,12 @@ void UpdateService::judge_trial(const Health& health) {
   if (healthy && !was_healthy_) healthy_since_us_ = health.now_us;
   was_healthy_ = healthy;
   if (!healthy || health.now_us - healthy_since_us_ < healthy_us) return;
-  if (!boot::confirm(slots_, started_.slot, started_.header.security_version)) return;
-  trial_ = false;
-  battery_.security_counter = boot::security_counter(slots_);
+  // never both: the loader starts cell constants on trial only with a confirmed image
+  boot::SlotFlash& slots = trial_ ? static_cast<boot::SlotFlash&>(slots_) : cells_;
+  const boot::Start& tried = trial_ ? started_ : cell_;
+  if (!boot::confirm(slots, tried.slot, tried.header.security_version)) return;
+  (trial_ ? battery_ : cell_battery_).security_counter = boot::security_counter(slots);
+  trial_ = cell_.trial = false;
   server_->confirmed();
 }
 

@@ -5,6 +5,7 @@
 //   signature  is left to the loader: its check would stop the samples for 0.2 s. The loader starts nothing without it.
 //   erases     nothing: an erase stops the core for up to two seconds. It asks the loader for it by a restart.
 //   restarts   only at rest, and only on request or when a trial has failed
+//   cell       cell constants of an update act from the start on, if they are accepted (firmware/cell_of_update.hpp)
 //   on trial   no contactor closes. So the reset that ends a failed trial opens none under load.
 #pragma once
 
@@ -14,6 +15,7 @@
 #include "boot/chip_slots.hpp"
 #include "boot/handover.hpp"
 #include "boot/update_server.hpp"
+#include "cell_of_update.hpp"
 #include "challenge_source.hpp"
 
 namespace bms::firmware {
@@ -31,14 +33,14 @@ class UpdateService final : public boot::UpdateSurroundings {
     std::uint64_t now_us = 0;
     bool at_rest = false;   ///< contactors open, no request
     bool measured = false;  ///< voltages of all cells and the current
-    bool fit = false;       ///< self-tests of the board, storage
+    bool fit = false;       ///< self-tests of the board, storage, an estimate that is a number
   };
   /// Call after each sample. Returns true if the battery is to store its state and restart now.
   bool restart_due(const Health& health);
-  /// The image has not confirmed itself yet: no contactor may close.
-  bool on_trial() const { return trial_; }
-  /// This start has rejected a newer image on trial.
-  bool returned() const { return started_.returned; }
+  /// The image, or its cell constants, has not confirmed itself yet: no contactor may close.
+  bool on_trial() const { return trial_ || cell_.trial; }
+  /// This start has rejected a newer image, or newer cell constants, on trial.
+  bool returned() const { return started_.returned || cell_.returned; }
 
   // UpdateSurroundings
   bool at_rest() override { return at_rest_; }
@@ -46,13 +48,14 @@ class UpdateService final : public boot::UpdateSurroundings {
   void restart() override { restart_wanted_ = true; }
 
  private:
+  void use_cell();
   void send_waiting(std::uint64_t now_us);
   void judge_trial(const Health& health);
 
-  boot::ChipSlots slots_{false};
+  boot::ChipSlots slots_{false}, cells_{false, boot::Kind::cell};
   std::optional<boot::KeyTable> keys_;
-  boot::Battery battery_;
-  boot::Start started_;
+  boot::Battery battery_, cell_battery_;
+  boot::Start started_, cell_;
   std::optional<ChallengeSource> challenges_;
   std::optional<boot::UpdateServer> server_;
   std::optional<boot::UpdateNode> node_;
@@ -66,6 +69,7 @@ struct UpdateOfBoard {};
 template <>
 struct UpdateOfBoard<true> {
   static UpdateService& update();
+  static std::uint32_t cell_hash_of_build() { return firmware::cell_hash_of_build(); }
   [[noreturn]] static void restart();
 };
 

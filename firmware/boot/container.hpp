@@ -4,7 +4,7 @@
 //        0      4   magic "BMSI"
 //        4      2   format, 1
 //        6      1   kind: 1 application, 2 cell constants
-//        7      1   slot: 0 A, 1 B; the payload is linked for the addresses of this slot
+//        7      1   slot: 0 A, 1 B; an application is linked for the addresses of this slot
 //        8      4   payload bytes
 //       12      4   version: major << 16, minor << 8, patch
 //       16      4   security version: raised when an older image must not run again
@@ -13,7 +13,8 @@
 //       28      4   flags: bit 0 development image
 //       32     32   board, the folder in boards/, padded with 0
 //       64      4   hash of the cell file (image_cell_hash)
-//       68      4   hash of the cell file that the code was built for; of an application the same
+//       68      4   hash of the cell file that the application is built with: of an application the same, of cell
+//                   constants that of the only application that may use them
 //       72      8   name of the key (crypto.hpp)
 //       80      8   release: the same in the containers of one file, and in no other
 //       88     40   0
@@ -24,7 +25,9 @@
 // One signature covers the header, and through the hashes the payload. So the receiver can refuse an image before it
 // writes a byte, and every block as it arrives.
 //
-// A file of the tool has one or several containers one after the other: the same image linked for both slots.
+// The payload of cell constants has at most one block (firmware/cell_update/format.hpp).
+//
+// A file of the tool has one or several containers one after the other: the same image for both slots.
 #pragma once
 
 #include <algorithm>

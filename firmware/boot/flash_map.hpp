@@ -26,10 +26,15 @@ inline constexpr std::array<std::uint32_t, 2> application_slots{0x0802'0000, 0x0
     cell_slots{0x080A'0000, 0x080C'0000};
 inline constexpr std::uint32_t application_slot_bytes = 256 * 1024, cell_slot_bytes = 128 * 1024;
 
-/// Where the payload of a slot begins; its vectors stand there, which need a multiple of 512 (VTOR).
-constexpr std::uint32_t payload_address(Kind kind, std::uint8_t slot) {
-  return (kind == Kind::application ? application_slots : cell_slots)[slot] + header_bytes;
+constexpr std::uint32_t slot_begin(Kind kind, std::uint8_t slot) {
+  return (kind == Kind::application ? application_slots : cell_slots)[slot];
 }
+constexpr std::uint32_t slot_bytes(Kind kind) {
+  return kind == Kind::application ? application_slot_bytes : cell_slot_bytes;
+}
+
+/// Where the payload of a slot begins; its vectors stand there, which need a multiple of 512 (VTOR).
+constexpr std::uint32_t payload_address(Kind kind, std::uint8_t slot) { return slot_begin(kind, slot) + header_bytes; }
 static_assert(payload_address(Kind::application, 0) % 512 == 0);
 
 }  // namespace bms::boot

@@ -9,14 +9,28 @@
 
 namespace bms::boot {
 
+/// What is received into.
+struct ReceiverTarget {
+  SlotFlash* flash;
+  const Battery* battery;
+  std::uint8_t running;  ///< the slot that may not be written; 2 if none runs
+};
+
 class Receiver {
  public:
   /// running: the slot that may not be written; 2 if none runs. check: check_header, or check_fields_and_key in an
   /// image that leaves the signature to the loader.
   Receiver(SlotFlash& flash, const Battery& battery, std::uint8_t running, HeaderCheck* check = check_header)
-      : flash_(flash), battery_(battery), running_(running), check_(check) {}
+      : to_{&flash, &battery, running}, check_(check) {}
 
-  std::uint8_t target() const { return running_ == 0 ? 1 : 0; }
+  /// Receives into other slots from now on. A transfer that was under way is over.
+  void aim_at(const ReceiverTarget& target) {
+    to_ = target;
+    active_ = false;
+    received_ = 0;
+  }
+  Kind kind() const { return to_.battery->kind; }
+  std::uint8_t target() const { return to_.running == 0 ? 1 : 0; }
   /// Erases the target, which takes seconds, or asks the loader for it: erase_at_restart. A slot that is erased already
   /// stays as it is. Refuses while the running image is on trial.
   Refusal prepare();
@@ -31,7 +45,9 @@ class Receiver {
 
   bool active() const { return active_; }
   std::uint32_t received() const { return received_; }
-  const Battery& battery() const { return battery_; }
+  const Battery& battery() const { return *to_.battery; }
+  /// Room of a block, for anyone while no transfer is active.
+  std::span<std::uint8_t, block_bytes> room() { return block_room_; }
 
  private:
   Refusal refuse(Refusal why) {
@@ -42,9 +58,9 @@ class Receiver {
   Refusal block_complete();
   bool write(std::uint32_t at, std::span<const std::uint8_t> bytes);
 
-  SlotFlash& flash_;
-  const Battery& battery_;
-  std::uint8_t running_;
+  SlotFlash& flash() { return *to_.flash; }
+
+  ReceiverTarget to_;
   HeaderCheck* check_;
   bool active_ = false;
   std::uint32_t expected_ = 0, received_ = 0;

@@ -34,10 +34,15 @@ enum class Refusal : std::uint8_t {
   other_kind,
   not_confirmed,
   erase_at_restart,
+  other_cell_file,
+  unknown_cell_format,
+  other_model,
+  other_limits,
+  cell_out_of_range,
 };
 
 /// For a person, in the order of Refusal.
-inline constexpr std::array<std::string_view, 24> refusal_words{
+inline constexpr std::array<std::string_view, 29> refusal_words{
     "accepted",
     "this is not an image of this format",
     "the image's header is inconsistent",
@@ -62,6 +67,11 @@ inline constexpr std::array<std::string_view, 24> refusal_words{
     "this slot holds another kind of data",
     "the running image is still on trial; wait until it has confirmed itself",
     "the battery restarts to erase the slot; it continues afterwards",
+    "the cell constants are for firmware that was built with another cell file",
+    "the cell constants have a format that the firmware does not know",
+    "the cell constants need a model that the firmware does not have",
+    "the cell constants have other limits or another capacity than the firmware, which protects by its own",
+    "a cell constant is outside the range that a cell file may have",
 };
 
 constexpr std::string_view words_for(Refusal refusal) {

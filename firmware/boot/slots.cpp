@@ -70,13 +70,13 @@ Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, 
   return Refusal::none;
 }
 
-Start choose(SlotFlash& flash, const Battery& battery, bool power_on) {
+Start choose(SlotFlash& flash, const Battery& battery, bool power_on, bool may_try) {
   Start start;
   const std::array<Marks, 2> marks{read_marks(flash, 0), read_marks(flash, 1)};
   const bool b_first = marks[1].complete && (!marks[0].complete || marks[1].sequence > marks[0].sequence);
   for (const std::uint8_t slot : {static_cast<std::uint8_t>(b_first), static_cast<std::uint8_t>(!b_first)}) {
     const Marks& m = marks[slot];
-    if (!m.complete) continue;
+    if (!m.complete || (!may_try && !m.confirmed)) continue;
     Refusal refusal = m.usable() ? Refusal::none : Refusal::trial_failed;
     if (m.usable() && trial_failed(flash, slot, m, power_on)) {
       start.returned = true;
@@ -92,6 +92,14 @@ Start choose(SlotFlash& flash, const Battery& battery, bool power_on) {
       return start;
     }
     if (start.refusal == Refusal::none) start.refusal = refusal;
+  }
+  return start;
+}
+
+Start choose_cell(SlotFlash& cells, const Battery& battery, const Start& application, bool power_on) {
+  const Start start = choose(cells, battery, power_on, !application.trial);
+  for (const std::uint8_t slot : {std::uint8_t{0}, std::uint8_t{1}}) {
+    if (!start.found || slot != start.slot) erase_if_asked(cells, slot);
   }
   return start;
 }

@@ -46,8 +46,23 @@ struct Start {
 };
 
 /// Decides after a reset and sets the marks for it. power_on: the reset was a loss of power; any other one ends a
-/// trial, because a running image resets only by watchdog, fault or its own wish.
-Start choose(SlotFlash& flash, const Battery& battery, bool power_on);
+/// trial, because a running image resets only by watchdog, fault or its own wish. may_try: false for cell constants
+/// while the application is on trial, so that a reset says which of both has failed; then only confirmed ones start.
+Start choose(SlotFlash& flash, const Battery& battery, bool power_on, bool may_try = true);
+
+/// The battery as it sees cell constants. Their counter is their own: it never forbids the running application.
+/// cell_hash: of the cell file that the application is built with.
+inline Battery for_cells(const Battery& battery, SlotFlash& cells, std::uint32_t cell_hash) {
+  Battery b = battery;
+  b.security_counter = security_counter(cells);
+  b.slot_bytes = cells.slot_bytes() - trailer_bytes;
+  b.kind = Kind::cell;
+  b.cell_hash = cell_hash;
+  return b;
+}
+/// Decides which cell constants act, after an application was found, and erases the slots for which that was asked. If
+/// none are found, those of the application's build act.
+Start choose_cell(SlotFlash& cells, const Battery& battery, const Start& application, bool power_on);
 
 /// Called by the image that runs, once it has confirmed itself. Raises the counter to its security
 /// version. May be called again.

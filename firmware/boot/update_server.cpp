@@ -162,6 +162,15 @@ void UpdateServer::read(std::span<const std::uint8_t> request, Answer& answer) c
       answer.put((started_.header.development() ? 1U : 0U) | (battery_.product ? 0U : 2U));
       answer.put(static_cast<std::uint32_t>(since_us_ / 1'000), 4);
       return;
+    case 0xF1A2: {
+      if (!cells_) return answer.reject(out_of_range);
+      const Start& cell = cells_->started;
+      answer.put(cell.found ? cell.slot : 0xFF).put(cell.trial).put(cell.returned);
+      answer.put(cell.found ? cell.header.version : 0, 4);
+      answer.put(cell.found ? cell.header.cell_hash : cells_->battery.cell_hash, 4).put(cells_->battery.cell_hash, 4);
+      answer.put(cells_->battery.security_counter, 4).put(static_cast<std::uint8_t>(cell.refusal));
+      return;
+    }
     case 0xF1A4:
       answer.put(static_cast<std::uint8_t>(refusal_));
       return;
@@ -176,6 +185,16 @@ void UpdateServer::refuse(Answer& answer, Refusal why) {
   answer.reject(waits ? conditions_not_correct : not_accepted);
 }
 
+/// False if this battery has no slots of that kind.
+bool UpdateServer::aim_at(Kind kind) {
+  if (kind != Kind::application && (kind != Kind::cell || !cells_)) return false;
+  if (kind == receiver_.kind()) return true;
+  receiver_.aim_at(kind == Kind::application
+                       ? application_
+                       : ReceiverTarget{&cells_->flash, &cells_->battery, running_slot(cells_->started)});
+  return true;
+}
+
 void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer) {
   if (request.size() < 4) return answer.reject(wrong_length);
   if (request[1] != 1) return answer.reject(sub_function_unknown);
@@ -188,11 +207,16 @@ void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer
     answer.put(receiver_.resume(digest), 4);
     return;
   }
-  if (request.size() != 4) return answer.reject(wrong_length);
+  if (request.size() != 4 && (request.size() != 5 || which != 0xFF00)) return answer.reject(wrong_length);
   Refusal why = Refusal::none;
   if (which == 0xFF00) {
     download_ = exited_ = false;
-    why = surroundings_.at_rest() ? receiver_.prepare() : Refusal::not_at_rest;
+    if (!aim_at(request.size() == 5 ? static_cast<Kind>(request[4]) : Kind::application))
+      why = Refusal::other_kind;
+    else if (!surroundings_.at_rest())
+      why = Refusal::not_at_rest;
+    else
+      why = on_trial() ? Refusal::not_confirmed : receiver_.prepare();
   } else if (which == 0xFF01) {
     if (!exited_) return answer.reject(wrong_order);
     if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
@@ -209,14 +233,16 @@ void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer
 void UpdateServer::request_download(std::span<const std::uint8_t> request, Answer& answer) {
   if (request.size() != 11 || request[1] != 0 || request[2] != 0x44) return answer.reject(out_of_range);
   if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
-  const std::uint32_t address = big(request, 3, 4), bytes = big(request, 7, 4),
-                      begin = application_slots[receiver_.target()];
+  const std::uint32_t address = big(request, 3, 4), bytes = big(request, 7, 4);
+  if (!aim_at(address >= cell_slots[0] ? Kind::cell : Kind::application)) return refuse(answer, Refusal::other_kind);
+  const std::uint32_t begin = slot_begin(receiver_.kind(), receiver_.target());
   exited_ = false;
   if (address == begin) {
+    if (on_trial()) return refuse(answer, Refusal::not_confirmed);
     if (const Refusal why = receiver_.begin(bytes); why != Refusal::none) return refuse(answer, why);
   } else if (!receiver_.active() || receiver_.received() == 0 || address != begin + receiver_.received()) {
-    return refuse(answer, address == application_slots[1 - receiver_.target()] ? Refusal::not_from_the_other_slot
-                                                                               : Refusal::incomplete);
+    const bool other = address == slot_begin(receiver_.kind(), static_cast<std::uint8_t>(1 - receiver_.target()));
+    return refuse(answer, other ? Refusal::not_from_the_other_slot : Refusal::incomplete);
   }
   download_ = true;
   blocks_ = 0;

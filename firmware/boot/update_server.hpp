@@ -4,12 +4,12 @@
 //   10 session            01 default, 02 programming; ends after 5 s without a request
 //   27 security access    01: challenge of 6 bytes; 02: operator (2), session_code (4) of
 //                         firmware/authentication/codes.hpp; a challenge of 0: no key, nothing to prove
-//   22 read               F1A0 board, F1A1 state, F1A4 last refusal (1)
-//   31 routine, 01 start  FF00 erase the target slot, returns 0, or 1 if the battery restarts for it and the tool has
-//   to
-//                         ask again; 0203 resume: digest of the header (32), returns the
+//   22 read               F1A0 board, F1A1 state, F1A2 cell constants, F1A4 last refusal (1)
+//   31 routine, 01 start  FF00 erase the target slot of the application, or with one more byte that of a kind of
+//                         container (container.hpp); returns 0, or 1 if the battery restarts for it and the tool has
+//                         to ask again; 0203 resume: digest of the header (32), returns the
 //                         bytes received; FF01 check the slot and make it the next to start
-//   34 request download   00 44 address (4) size (4): the target slot from its begin on, or from where it stopped
+//   34 request download   00 44 address (4) size (4): a target slot from its begin on, or from where it stopped
 //   36 transfer data      sequence, at most 1,024 bytes
 //   37 transfer exit
 //   11 reset              01
@@ -48,6 +48,18 @@ class UpdateSurroundings {
 /// accepts such images), time since this start in ms (4): less than before after a restart.
 inline constexpr std::size_t state_record_bytes = 28;
 
+/// Cell constants, as 22 F1A2 sends them: slot whose constants act (0xFF: those of the application's build), trial (1),
+/// last start returned (1), version (4), hash of the cell file that acts (4), of the build's (4), security counter (4),
+/// why the newest do not act (1).
+inline constexpr std::size_t cell_record_bytes = 20;
+
+/// Slots of cell constants, of an application that can use them.
+struct CellSlots {
+  SlotFlash& flash;
+  const Battery& battery;
+  Start started;  ///< found: they act
+};
+
 class UpdateServer {
  public:
   static constexpr std::uint64_t session_us = 5'000'000, locked_us = 600'000'000;
@@ -55,13 +67,15 @@ class UpdateServer {
 
   UpdateServer(SlotFlash& flash, const Battery& battery, const Start& started,
                const std::optional<authentication::Key>& service_key, UpdateSurroundings& surroundings,
-               HeaderCheck* check = check_header)
-      : receiver_(flash, battery, started.found ? started.slot : 2, check),
+               HeaderCheck* check = check_header, const std::optional<CellSlots>& cells = std::nullopt)
+      : application_{&flash, &battery, running_slot(started)},
+        receiver_(flash, battery, application_.running, check),
         battery_(battery),
         started_(started),
         key_(service_key),
         surroundings_(surroundings),
-        refusal_(started.refusal) {}
+        refusal_(started.refusal),
+        cells_(cells) {}
 
   /// Returns the answer, empty if none is to be sent. `room` has at least longest_answer bytes.
   static constexpr std::size_t longest_answer = 64;
@@ -72,8 +86,18 @@ class UpdateServer {
   /// Returns true once after an accepted reset; the caller has sent the answer and calls restart(). A restart that does
   /// not follow has to be asked for again.
   bool take_restart() { return std::exchange(restart_, false); }
-  /// The image has confirmed itself: it is on trial no longer.
-  void confirmed() { started_.trial = false; }
+  /// What was on trial has confirmed itself.
+  void confirmed() {
+    started_.trial = false;
+    if (cells_) cells_->started.trial = false;
+  }
+  /// The application cannot use the cell constants that the loader has started: those of its build act.
+  void cell_refused(Refusal why) {
+    cells_->started.found = cells_->started.trial = false;
+    cells_->started.refusal = why;
+  }
+  /// Of a block, for anyone while no transfer is active.
+  std::span<std::uint8_t, block_bytes> room() { return receiver_.room(); }
   Refusal last_refusal() const { return refusal_; }
   const Receiver& receiver() const { return receiver_; }
 
@@ -87,7 +111,12 @@ class UpdateServer {
   void transfer(std::span<const std::uint8_t> request, Answer& answer);
   void refuse(Answer& answer, Refusal why);
   bool unlocked() const { return programming_ && (unlocked_ || !key_); }
+  /// Neither slot is written while the other one returns if a trial fails.
+  bool on_trial() const { return started_.trial || (cells_ && cells_->started.trial); }
+  bool aim_at(Kind kind);
+  static constexpr std::uint8_t running_slot(const Start& started) { return started.found ? started.slot : 2; }
 
+  ReceiverTarget application_;
   Receiver receiver_;
   const Battery& battery_;
   Start started_;
@@ -98,6 +127,7 @@ class UpdateServer {
   unsigned wrong_ = 0;
   std::uint32_t blocks_ = 0;  ///< of this download
   Refusal refusal_;           ///< at first that of the start: why the newest image does not run
+  std::optional<CellSlots> cells_;
 };
 
 /// Server and transport together: frames in, frames out.

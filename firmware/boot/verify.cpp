@@ -17,6 +17,8 @@ Refusal check_fields(const Header& header, const Battery& battery, std::uint8_t 
   if (header.kind != battery.kind) return Refusal::other_kind;
   if (header.board_name() != battery.board) return Refusal::other_board;
   if (header.payload_bytes > battery.slot_bytes - header_bytes) return Refusal::too_large;
+  if (header.kind == Kind::cell && header.payload_bytes > block_bytes) return Refusal::too_large;
+  if (header.kind == Kind::cell && header.built_for_cell_hash != battery.cell_hash) return Refusal::other_cell_file;
   if (header.slot != slot) return Refusal::other_slot;
   if (header.development() && battery.product) return Refusal::development_image;
   if (header.security_version < battery.security_counter) return Refusal::older_security;

@@ -16,15 +16,20 @@ struct TrustedKey {
   bool revoked = false;      ///< by a bit that cannot be set back (slot_flash.hpp)
 };
 
+/// What the application says of cell constants that it is to use.
+using ContentCheck = Refusal(std::span<const std::uint8_t> payload);
+
 /// The battery that is to run an image.
 struct Battery {
   std::string_view board;
   std::span<const TrustedKey> keys;
   std::uint32_t security_counter = 0;  ///< lowest security version that may run
   std::uint32_t loader_version = 0;
-  std::uint32_t slot_bytes = 0;   ///< for header and payload
-  bool product = true;            ///< refuses development images
-  Kind kind = Kind::application;  ///< what the slot is for
+  std::uint32_t slot_bytes = 0;     ///< for header and payload
+  bool product = true;              ///< refuses development images
+  Kind kind = Kind::application;    ///< what the slot is for
+  std::uint32_t cell_hash = 0;      ///< for cell constants: cell file that the application was built with
+  ContentCheck* content = nullptr;  ///< before cell constants are written; nullptr: accepts any
 };
 
 /// Checks the header: format, board, slot, size, security version, key, signature, in this order, so that the reason is

@@ -1,5 +1,6 @@
-// The boot loader: started by every reset. It decides which of the two images runs, checks it completely, leaves it a
-// message of what was decided, and starts it under the watchdog. If no image may run, it waits for one on the bus.
+// The boot loader: started by every reset. It decides which of the two images runs and with which cell constants,
+// checks both completely, leaves a message of what was decided, and starts the image under the watchdog. If no image
+// may run, it waits for one on the bus.
 #include <optional>
 
 #include "authentication/codes.hpp"
@@ -67,6 +68,14 @@ class Waiting final : public bms::boot::UpdateSurroundings {
   hal::restart();
 }
 
+/// For the image, which finds nothing of an interrupted start.
+template <class Message>
+void leave(std::uint32_t address, const Message& message) {
+  *reinterpret_cast<volatile std::uint32_t*>(address) = 0;
+  std::ranges::copy(std::span(reinterpret_cast<const std::uint8_t*>(&message), sizeof message),
+                    reinterpret_cast<volatile std::uint8_t*>(address));
+}
+
 }  // namespace
 
 void bms::hal::supply_failing() {}
@@ -83,9 +92,10 @@ int main() {
   hal::watchdog_feed();
   if (!start.found) wait_for_an_image(slots, battery, start);
   boot::erase_if_asked(slots, static_cast<std::uint8_t>(1 - start.slot));
-  *reinterpret_cast<volatile std::uint32_t*>(boot::handover_address) = 0;
-  const boot::Handover handover = boot::handover_of(start, battery);
-  std::ranges::copy(std::span(reinterpret_cast<const std::uint8_t*>(&handover), sizeof handover),
-                    reinterpret_cast<volatile std::uint8_t*>(boot::handover_address));
+  static boot::ChipSlots cells(true, boot::Kind::cell);
+  const boot::Battery cell_battery = boot::for_cells(battery, cells, start.header.cell_hash);
+  const boot::Start cell = boot::choose_cell(cells, cell_battery, start, hal::started_by_power());
+  leave(boot::handover_address, boot::handover_of(start, battery));
+  leave(boot::cell_handover_address, boot::cell_handover_of(cell, cell_battery));
   hal::start_image(boot::payload_address(boot::Kind::application, start.slot));
 }

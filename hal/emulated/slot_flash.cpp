@@ -1,4 +1,4 @@
-// Both slots and the one-time words in a file of the host, the third argument of the emulator's command line: "fw
+// All slots and the one-time words in a file of the host, the third argument of the emulator's command line: "fw
 // STORAGE SLOTS CAUSE". QEMU cannot write the flash that it executes: the same file is also its memory at 0x0802'0000,
 // as it was when the emulator started. So whoever runs the emulator starts it again after each reset (-no-reboot).
 #include "hal/slot_flash.hpp"
@@ -12,7 +12,7 @@ namespace bms::hal {
 
 namespace {
 
-constexpr std::uint32_t one_time_at = 2 * slot_flash_bytes;
+constexpr std::uint32_t one_time_at = all_slots_bytes;
 
 int slots_file() {
   static int file = -2;  // not looked for yet
@@ -46,17 +46,17 @@ bool slot_erase(std::uint8_t slot) {
   std::array<unsigned char, 1024> erased;
   erased.fill(0xFF);
   bool done = true;
-  for (std::uint32_t at = 0; at < slot_flash_bytes && done; at += erased.size())
-    done = write_at(slot * slot_flash_bytes + at, erased);
+  const std::uint32_t end = slot_flash_at(static_cast<std::uint8_t>(slot + 1));
+  for (std::uint32_t at = slot_flash_at(slot); at < end && done; at += erased.size()) done = write_at(at, erased);
   return done;
 }
 
 bool slot_program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) {
-  return clear_bits(slot * slot_flash_bytes + at, word);
+  return clear_bits(slot_flash_at(slot) + at, word);
 }
 
 void slot_read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) {
-  read_at(slot * slot_flash_bytes + at, into);
+  read_at(slot_flash_at(slot) + at, into);
 }
 
 std::uint32_t one_time_word(std::uint32_t word) {

@@ -8,11 +8,11 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
-#include "files/cell_fields.hpp"
 #include "files/healthy_table.hpp"
 #include "files/text_file.hpp"
 #include "files/toml_table.hpp"
 #include "files/toml_text.hpp"
+#include "model/cell_fields.hpp"
 #include "model/possible_cell.hpp"
 
 namespace bms::files {

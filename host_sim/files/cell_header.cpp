@@ -5,7 +5,7 @@
 
 #include <fmt/format.h>
 
-#include "files/cell_fields.hpp"
+#include "model/cell_fields.hpp"
 
 namespace bms::files {
 

@@ -27,6 +27,7 @@ struct Firmwares {
   std::string before_name, after_name;
   hil::FirmwareRun before, after;
   hil::FirmwareComparison comparison;
+  std::string before_cell, after_cell;  ///< hashes of the cell files that the images are built with
 };
 
 /// h:mm:ss
@@ -54,6 +55,15 @@ std::filesystem::path checked_image(const std::string& path) {
 images::SourceTree sources_named(const std::string& name) {
   if (name.empty()) return images::present_sources();
   return std::filesystem::is_directory(name) ? images::sources_in(name) : images::sources_of_commit(name);
+}
+
+/// Hash of the cell file that an image is built with.
+std::string cell_hash_of(const std::filesystem::path& image) {
+  const images::ImageFile file(image);
+  std::uint32_t hash = 0;
+  const std::string bytes = file.at(file.symbol("image_cell_hash"), sizeof hash);
+  for (std::size_t k = 0; k < bytes.size(); ++k) hash |= std::uint32_t{static_cast<unsigned char>(bytes[k])} << 8 * k;
+  return fmt::format("{:08x}", hash);
 }
 
 /// name: an image, a checkout, a commit, or empty for the present sources.
@@ -110,6 +120,8 @@ Firmwares compute(const AgainstOptions& options, const hil::SessionPlan& plan) {
   f.after_name = options.firmware;
   const auto before = image_of(options.base, options, plan.cell, plan.cells),
              after = image_of(options.firmware, options, new_cell, plan.cells);
+  f.before_cell = cell_hash_of(before);
+  f.after_cell = cell_hash_of(after);
   const auto show = progress_on_stderr(1, [](double done, double left_s, const std::string&) {
     return fmt::format("both firmwares: {:.0f} %, {:.0f} s left", 100 * done, std::isfinite(left_s) ? left_s : 0);
   });
@@ -223,6 +235,8 @@ std::string json_of(const AgainstOptions& options, const hil::SessionPlan& plan,
               {"base", options.base.empty() ? Json() : Json(options.base)},
               {"board", options.board},
               {"cell", plan.cell.name},
+              {"cell_hash", f.before_cell},
+              {"against_cell_hash", f.after_cell},
               {"cells", plan.cells},
               {"samples", c.samples},
               {"duration_s", f.before.session.duration_s},

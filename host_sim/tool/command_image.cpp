@@ -1,13 +1,15 @@
-// bms image: signed images for bms update. Makes keys, signs, shows and checks.
+// bms image: signed images and cell constants for bms update. Makes keys, signs, shows and checks.
 #include <memory>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "files/bad_input.hpp"
+#include "files/cell_file.hpp"
 #include "files/text_file.hpp"
 #include "tool/commands.hpp"
 #include "tool/options.hpp"
+#include "update/cell_payload.hpp"
 #include "update/container_file.hpp"
 #include "update/linked_image.hpp"
 #include "update/loader_file.hpp"
@@ -20,7 +22,7 @@ using update::Container;
 
 struct ImageOptions {
   std::vector<std::string> images, product_keys, development_keys;
-  std::string file, key, board, version, oldest_loader = "0.0.0", out;
+  std::string file, key, board, version, oldest_loader = "0.0.0", cell, built, out;
   unsigned security = 0;
   bool development = false;
   Output output;
@@ -42,6 +44,7 @@ nlohmann::ordered_json json_of(const Container& c) {
           {"oldest_loader", update::version_text(h.oldest_loader)},
           {"development", h.development()},
           {"cell_hash", fmt::format("{:08x}", h.cell_hash)},
+          {"built_for_cell_hash", fmt::format("{:08x}", h.built_for_cell_hash)},
           {"bytes", h.payload_bytes},
           {"key", key_text(c)},
           {"sha256", files::sha256(c.bytes)}};
@@ -56,6 +59,7 @@ class ImageCommand final : public Command {
         "Example: bms image sign slot_a.elf slot_b.elf --key product.pem --board stm32f405_forklift --version 0.2.0 "
         "--security-version 1 --out update.bms");
     add_sign(*c.add_subcommand("sign", "Sign an image that is linked for both slots"));
+    add_cell(*c.add_subcommand("cell", "Sign the constants of a cell file, for batteries that keep their firmware"));
     CLI::App& show = *c.add_subcommand("show", "Show what a file of signed images states");
     show.add_option("file", o_.file, "signed images")->required()->check(not_empty());
     add_json(show, o_.output);
@@ -86,6 +90,7 @@ class ImageCommand final : public Command {
   int run() override {
     const std::string what = sub_->get_subcommands().front()->get_name();
     if (what == "sign") return sign();
+    if (what == "cell") return cell();
     if (what == "show") return show();
     if (what == "verify") return verify();
     if (what == "loader") return loader();
@@ -99,6 +104,22 @@ class ImageCommand final : public Command {
  private:
   void add_sign(CLI::App& c) {
     c.add_option("images", o_.images, "ELF images, one for each slot")->required()->expected(1, 2)->check(not_empty());
+    c.add_option("--oldest-loader", o_.oldest_loader, "oldest boot loader that may start it")->capture_default_str();
+    add_statements(c);
+  }
+  void add_cell(CLI::App& c) {
+    c.footer(
+        "Example: bms image cell better.toml --for table9 --key product.pem --board stm32f405_forklift --version 1.0.0 "
+        "--security-version 1 --out cell.bms");
+    c.add_option("cell", o_.cell, "cell file")->required()->check(not_empty());
+    c.add_option("--for", o_.built, "cell file that the batteries' firmware is built with")
+        ->required()
+        ->check(not_empty())
+        ->type_name("CELL");
+    add_statements(c);
+  }
+  /// What signature and header state.
+  void add_statements(CLI::App& c) {
     c.add_option("--key", o_.key, "private key: PEM file, or org.openssl.engine:pkcs11:pkcs11:...")
         ->required()
         ->check(not_empty());
@@ -107,14 +128,21 @@ class ImageCommand final : public Command {
     c.add_option("--security-version", o_.security, "raise it when older images must not run again")
         ->required()
         ->check(Within(0, 224));
-    c.add_option("--oldest-loader", o_.oldest_loader, "oldest boot loader that may start it")->capture_default_str();
     c.add_flag("--development", o_.development, "for batteries with a development loader only");
     c.add_option("--out", o_.out, "file to write")->required()->check(not_empty())->type_name("FILE");
   }
 
-  int sign() {
+  void state(boot::Header& header, const std::string& oldest_loader) const {
     if (o_.board.size() >= boot::board_name_bytes)
       throw files::BadInput("--board", 1, fmt::format("'{}' is too long, expected at most 31 characters", o_.board));
+    std::ranges::copy(o_.board, header.board.begin());
+    header.version = update::read_version("--version", o_.version);
+    header.security_version = o_.security;
+    header.oldest_loader = update::read_version("--oldest-loader", oldest_loader);
+    header.flags = o_.development ? boot::flag_development : 0;
+  }
+
+  int sign() {
     std::vector<update::Payload> payloads;
     for (const std::string& image : o_.images) {
       update::Payload p = update::read_linked_image(image);
@@ -122,13 +150,20 @@ class ImageCommand final : public Command {
         throw files::BadInput(image, 1, "is linked for the same slot as the first image, expected the other one");
       if (!payloads.empty() && payloads.front().header.cell_hash != p.header.cell_hash)
         throw files::BadInput(image, 1, "has another cell file than the first image");
-      std::ranges::copy(o_.board, p.header.board.begin());
-      p.header.version = update::read_version("--version", o_.version);
-      p.header.security_version = o_.security;
-      p.header.oldest_loader = update::read_version("--oldest-loader", o_.oldest_loader);
-      p.header.flags = o_.development ? boot::flag_development : 0;
+      state(p.header, o_.oldest_loader);
       payloads.push_back(std::move(p));
     }
+    return write(std::move(payloads));
+  }
+
+  int cell() {
+    constexpr const char* first_loader_with_cells = "0.2.0";
+    auto payloads = update::cell_payloads(files::read_cell(o_.cell), files::read_cell(o_.built));
+    for (update::Payload& p : payloads) state(p.header, first_loader_with_cells);
+    return write(std::move(payloads));
+  }
+
+  int write(std::vector<update::Payload> payloads) {
     std::string all;
     for (const Container& c : update::sign(std::move(payloads), update::SigningKey(o_.key))) all += c.bytes;
     files::write_file(o_.out, all);

@@ -1,5 +1,6 @@
-// bms update: new firmware for a battery, over its CAN bus (host_sim/update/update_run.hpp), or for the trucks of a
-// depot (host_sim/update/depot_update.hpp).
+// bms update: new firmware or new cell constants for a battery, over its CAN bus (host_sim/update/update_run.hpp), or
+// for the trucks of a depot (host_sim/update/depot_update.hpp). Cell constants are sent only with a replay of their
+// cell file against the one that acts (bms replay --against).
 #include <memory>
 
 #include <fmt/format.h>
@@ -22,7 +23,8 @@ namespace {
 using update::UpdateResult;
 
 struct UpdateOptions {
-  std::string source, image, key, out;
+  std::string source, image, key, out, replayed;
+  bool other_faults = false;
   unsigned operator_number = 0;
   double wait_s = 90;
   Output output;
@@ -37,12 +39,17 @@ class UpdateCommand final : public Command {
          "source", o_.source,
          "can0, vcan0: SocketCAN; slcan:/dev/ttyACM0: a serial adapter; NAME.csv: trucks, buses, keys of a depot")
         ->required();
-    c.add_option("image", o_.image, "signed images, from bms image sign")->required()->check(not_empty());
+    c.add_option("image", o_.image, "signed images or cell constants, from bms image")->required()->check(not_empty());
     c.add_option("--key", o_.key, "device key of this battery, 32 hexadecimal digits")
         ->check(not_empty())
         ->type_name("FILE");
     c.add_option("--operator", o_.operator_number, "who answers for it")->check(Within(0, 65'535));
     c.add_option("--wait", o_.wait_s, "seconds for the new image to confirm itself")->check(Within(1, 3'600));
+    c.add_option("--replayed", o_.replayed,
+                 "of cell constants: what bms replay LOG --cell OLD --against . --against-cell NEW --json FILE wrote")
+        ->check(not_empty())
+        ->type_name("FILE");
+    c.add_flag("--other-faults", o_.other_faults, "the replay may show other faults, or contactors that open");
     c.add_option("--out", o_.out, "table of what runs where, with a table of trucks; a later run continues it")
         ->check(not_empty())
         ->type_name("FILE");
@@ -56,6 +63,11 @@ class UpdateCommand final : public Command {
     if (!o_.key.empty()) wish.device_key = read_key(o_.key);
     wish.operator_number = static_cast<std::uint16_t>(o_.operator_number);
     wish.start_wait_s = o_.wait_s;
+    for (const auto& c : wish.containers) {
+      if (c.header.kind != wish.containers.front().header.kind)
+        throw files::BadInput(o_.image, 1, "has images and cell constants, expected one kind in a file");
+    }
+    if (wish.containers.front().header.kind == boot::Kind::cell) ask_for_replay(wish);
     if (o_.source.ends_with(".csv")) return depot(wish);
     if (!o_.out.empty()) throw files::BadInput("--out", 1, "needs a table of trucks, NAME.csv, in place of a bus");
     const auto shown = progress_on_stderr(0.5, [](double done, double left_s, const std::string&) {
@@ -83,6 +95,39 @@ class UpdateCommand final : public Command {
   }
 
  private:
+  /// Cell constants change what a battery says of itself, so somebody has to have seen it on a log.
+  void ask_for_replay(update::UpdateWish& wish) const {
+    const boot::Header& header = wish.containers.front().header;
+    const std::string cell = fmt::format("{:08x}", header.cell_hash), board(header.board_name());
+    if (o_.replayed.empty())
+      throw files::BadInput(
+          o_.image, 1,
+          fmt::format(
+              "has cell constants; expected --replayed FILE, of bms replay LOG --board {} --cell OLD --against . "
+              "--against-cell NEW --json FILE",
+              board));
+    const auto refuse = [&](const std::string& what) { throw files::BadInput(o_.replayed, 1, what); };
+    const auto report = nlohmann::json::parse(files::read_file(o_.replayed), nullptr, false);
+    if (!report.is_object() || report.value("command", "") != "replay" || !report.contains("against_cell_hash") ||
+        !report.contains("faults") || !report.contains("cut_off_at_s"))
+      refuse("expected the JSON of bms replay --against");
+    if (report.value("board", "") != board || report.value("against_cell_hash", "") != cell ||
+        report.value("samples", 0.0) <= 0)
+      refuse(fmt::format("is a replay of the cell file {} on {}, expected {} on {}",
+                         report.value("against_cell_hash", ""), report.value("board", ""), cell, board));
+    const auto& cut_off = report["cut_off_at_s"];
+    if (!o_.other_faults && (!report["faults"].empty() || cut_off["before"] != cut_off["after"]))
+      refuse(
+          "shows other faults with the new cell file, or contactors that open at another time, expected the same, or "
+          "--other-faults if that is what the new cell file is for");
+    print_summary(o_.output, fmt::format("{}", report.value("statement", "")));
+    wish.gate = [before = report.value("cell_hash", "")](std::uint32_t acting) {
+      const std::string acts = fmt::format("{:08x}", acting);
+      if (acts == before) return std::string();
+      return fmt::format("the replay compares with the cell file {}, but {} acts in this battery", before, acts);
+    };
+  }
+
   int depot(const update::UpdateWish& all) const {
     if (o_.out.empty()) throw files::BadInput("--out", 1, "is missing, expected the table of what runs where");
     if (!o_.key.empty()) throw files::BadInput("--key", 1, "is of one battery, expected the column key of the trucks");

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -19,8 +18,6 @@ using Bytes = Link::Bytes;
 constexpr std::size_t piece_bytes = 1'024;
 constexpr int most_tries = 5;
 constexpr std::size_t earliest_state_bytes = 24;          // without the time since the start
-constexpr std::chrono::seconds longest_until_restart{3};  // a sample, and the state that is stored before
-constexpr std::chrono::seconds longest_until_sample{10};  // after a start
 constexpr std::uint8_t negative = 0x7F, pending = 0x78;
 
 std::uint64_t now_us() {
@@ -77,8 +74,9 @@ class Update {
       if (!before) throw Refused{"no battery answers, or it has no boot loader"};
       state_ = *before;
       result_.from = version_text(state_.version);
+      if (of_cell()) prepare_cell();
       choose();
-      result_.to = version_text(chosen_->header.version);
+      result_.to = of_cell() ? cell_text(chosen_->header.cell_hash) : version_text(chosen_->header.version);
       open_session();
       send();
       restart();
@@ -90,9 +88,27 @@ class Update {
   }
 
  private:
+  boot::Kind kind() const { return wish_.containers.front().header.kind; }
+  bool of_cell() const { return kind() == boot::Kind::cell; }
+  static std::string cell_text(std::uint32_t hash) { return fmt::format("cell {:08x}", hash); }
+
+  void prepare_cell() {
+    const auto cell = read_cell_state(link_);
+    if (!cell) throw Refused{"the firmware or the boot loader of this battery takes no cell constants by themselves"};
+    cell_ = *cell;
+    result_.from = cell_text(cell_.acting_hash);
+    const boot::Header& header = wish_.containers.front().header;
+    if (header.built_for_cell_hash != cell_.built_hash)
+      throw Refused{fmt::format("{}: {:08x}, that of the battery {:08x}", words_for(boot::Refusal::other_cell_file),
+                                header.built_for_cell_hash, cell_.built_hash)};
+    if (header.cell_hash == cell_.acting_hash) throw Refused{"the battery uses these cell constants already"};
+    if (const std::string why = wish_.gate(cell_.acting_hash); !why.empty()) throw Refused{why};
+  }
+
   /// What no battery would accept is not sent.
   void choose() {
-    const std::uint8_t target = state_.running == std::uint8_t{0} ? 1 : 0;
+    const auto& running = of_cell() ? cell_.slot : state_.running;
+    const std::uint8_t target = running == std::uint8_t{0} ? 1 : 0;
     for (const Container& c : wish_.containers) {
       if (c.header.slot == target) chosen_ = &c;
     }
@@ -147,7 +163,7 @@ class Update {
 
   /// After its start a battery does not know that it rests before its first sample.
   Bytes expect_at_rest(const Bytes& message) {
-    for (const auto end = Clock::now() + longest_until_sample;;) {
+    for (const auto end = Clock::now() + std::chrono::duration<double>(wish_.sample_wait_s);;) {
       try {
         return expect(message, 10'000);
       } catch (const Refused& refused) {
@@ -159,7 +175,8 @@ class Update {
 
   /// A battery that protects cannot erase: it restarts, its loader erases, and the request is repeated.
   void erase() {
-    const Bytes ask{0x31, 0x01, 0xFF, 0x00};
+    Bytes ask{0x31, 0x01, 0xFF, 0x00};
+    if (of_cell()) ask.push_back(static_cast<std::uint8_t>(boot::Kind::cell));
     for (int tries = 0; tries < 2; ++tries) {
       if ((tries == 0 ? expect(ask, 10'000) : expect_at_rest(ask)).at(4) == 0) return;
       const auto end = Clock::now() + std::chrono::seconds(20);
@@ -177,7 +194,7 @@ class Update {
     result_.resumed_at = at;
     if (at == 0) erase();
     Bytes download{0x34, 0x00, 0x44};
-    put(download, boot::application_slots[chosen_->header.slot] + at, 4);
+    put(download, boot::slot_begin(kind(), chosen_->header.slot) + at, 4);
     put(download, size, 4);
     expect(download);
     std::uint8_t sequence = 0;
@@ -205,7 +222,9 @@ class Update {
   /// a battery that does not state it another slot, a trial or a return shows it.
   void restart() {
     const auto before = read_until_answered();
-    if (!before) throw Refused{"the battery does not answer any more; send again, the transfer resumes"};
+    const auto cell_before = before && of_cell() ? read_cell_state(link_) : std::nullopt;
+    if (!before || (of_cell() && !cell_before))
+      throw Refused{"the battery does not answer any more; send again, the transfer resumes"};
     expect({0x11, 0x01});
     const auto begin = Clock::now();
     const auto end = begin + std::chrono::duration<double>(wish_.start_wait_s);
@@ -217,13 +236,33 @@ class Update {
       const auto now = read_state(link_);
       restarted = restarted || (now && (up_ms && now->up_ms ? *now->up_ms < *up_ms : differs(*now)));
       if (now) up_ms = now->up_ms;
-      if (now && !restarted && Clock::now() - begin > longest_until_restart)
+      const auto cell = now && of_cell() ? read_cell_state(link_) : std::nullopt;
+      restarted = restarted || (cell && differ(*cell_before, *cell));
+      if (now && !restarted && Clock::now() - begin > std::chrono::duration<double>(wish_.restart_wait_s))
         throw Refused{"the battery has not restarted: the image is complete and starts at its next restart"};
-      if (now && restarted && !now->trial) return decide(*now);
-      std::this_thread::sleep_for(std::chrono::milliseconds(200));
+      if (now && restarted && !now->trial && !of_cell()) return decide(*now);
+      if (restarted && cell && !cell->trial) return decide(*cell);
+      wish_.pause();
     }
     throw Refused{restarted ? "the new image was started and has not confirmed itself yet"
                             : "the battery does not answer after its restart"};
+  }
+
+  /// Cell constants are sent within seconds after a restart, so the time since the next one may not be less.
+  static bool differ(const CellState& a, const CellState& b) {
+    return a.slot != b.slot || a.trial != b.trial || a.returned != b.returned || a.refusal != b.refusal;
+  }
+
+  void decide(const CellState& now) {
+    if (now.acting_hash == chosen_->header.cell_hash) {
+      result_.outcome = UpdateResult::Outcome::done;
+      return;
+    }
+    result_.outcome = UpdateResult::Outcome::returned;
+    result_.reason = now.refusal == boot::Refusal::none || now.refusal == boot::Refusal::trial_failed
+                         ? "the battery did not confirm itself with the new cell constants"
+                         : fmt::format("the new cell constants were not used: {}", boot::words_for(now.refusal));
+    result_.reason += now.slot ? "; the old ones act again" : "; those of the firmware act again";
   }
 
   /// No image is on trial any more.
@@ -244,6 +283,7 @@ class Update {
   Link link_;
   const UpdateWish& wish_;
   BatteryState state_;
+  CellState cell_;
   const Container* chosen_ = nullptr;
   UpdateResult result_;
 };
@@ -317,6 +357,22 @@ std::optional<BatteryState> read_state(Link& link) {
   s.development_image = ((*state)[26] & 1) != 0;
   s.accepts_development = ((*state)[26] & 2) != 0;
   if (state->size() >= 3 + boot::state_record_bytes) s.up_ms = big(*state, 27, 4);
+  return s;
+}
+
+std::optional<CellState> read_cell_state(Link& link) {
+  std::optional<Bytes> answer;
+  for (int tries = 0; !answer && tries < most_tries; ++tries) answer = link.request({0x22, 0xF1, 0xA2});
+  if (!answer || answer->size() < 3 + boot::cell_record_bytes || (*answer)[0] != 0x62) return std::nullopt;
+  CellState s;
+  if ((*answer)[3] < 2) s.slot = (*answer)[3];
+  s.trial = (*answer)[4] != 0;
+  s.returned = (*answer)[5] != 0;
+  s.version = big(*answer, 6, 4);
+  s.acting_hash = big(*answer, 10, 4);
+  s.built_hash = big(*answer, 14, 4);
+  s.security_counter = big(*answer, 18, 4);
+  s.refusal = static_cast<boot::Refusal>((*answer)[22]);
   return s;
 }
 

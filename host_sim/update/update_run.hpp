@@ -1,12 +1,14 @@
-// One update of one battery: asks what runs, sends the container for the other slot, starts it, and waits for what the
-// battery says afterwards. Services: firmware/boot/update_server.hpp.
+// One update of one battery: asks what runs, sends the container for the other slot of its kind, starts it, and
+// waits for what the battery says afterwards. Services: firmware/boot/update_server.hpp.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "authentication/codes.hpp"
@@ -44,17 +46,32 @@ struct BatteryState {
   std::optional<std::uint32_t> up_ms;  ///< time since its start; an earlier update server does not state it
 };
 
+/// Its cell constants.
+struct CellState {
+  std::optional<std::uint8_t> slot;  ///< whose constants act; nothing: those of the application's build
+  bool trial = false, returned = false;
+  std::uint32_t version = 0, acting_hash = 0, built_hash = 0, security_counter = 0;
+  boot::Refusal refusal = boot::Refusal::none;  ///< why the newest do not act
+};
+
 struct UpdateWish {
-  std::vector<Container> containers;
+  std::vector<Container> containers;  ///< of one kind
+  /// Of cell constants: called with the hash of the cell file that acts, before anything is sent. Returns why not,
+  /// empty to go on.
+  std::function<std::string(std::uint32_t acting_hash)> gate = [](std::uint32_t) { return std::string(); };
   std::optional<authentication::Key> device_key;
   std::uint16_t operator_number = 0;
-  double start_wait_s = 90;  ///< for the new image to confirm itself
+  double start_wait_s = 90;   ///< for the new image to confirm itself
+  double restart_wait_s = 3;  ///< a sample, and the state that is stored before
+  double sample_wait_s = 10;  ///< from a start to the first sample, before which it does not know that it rests
+  /// Between two questions whether the trial is over.
+  std::function<void()> pause = [] { std::this_thread::sleep_for(std::chrono::milliseconds(200)); };
   std::function<void(std::uint32_t done, std::uint32_t of)> progress = [](std::uint32_t, std::uint32_t) {};
 };
 
 struct UpdateResult {
   enum class Outcome { done, refused, returned } outcome = Outcome::refused;
-  std::string from, to, reason;
+  std::string from, to, reason;  ///< versions; of cell constants "cell " and the hash of the cell file
   double seconds = 0;
   std::uint32_t sent = 0, resumed_at = 0;  ///< bytes
 };
@@ -64,6 +81,9 @@ const char* name_of(UpdateResult::Outcome outcome);
 
 /// Nothing if there is no battery with an update server.
 std::optional<BatteryState> read_state(Link& link);
+
+/// Nothing if firmware or boot loader know no cell constants of an update.
+std::optional<CellState> read_cell_state(Link& link);
 
 UpdateResult run_update(monitor::FrameSource& source, const UpdateWish& wish);
 

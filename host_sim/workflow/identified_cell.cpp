@@ -9,11 +9,11 @@
 #include <fmt/format.h>
 
 #include "files/bad_input.hpp"
-#include "files/cell_fields.hpp"
 #include "files/recording.hpp"
 #include "identification/joint_fit.hpp"
 #include "identification/ocv_pieces.hpp"
 #include "measurement/statistics.hpp"
+#include "model/cell_fields.hpp"
 #include "replay/simulation.hpp"
 #include "workflow/reference_temperature.hpp"
 #include "workflow/slow_parts.hpp"
@@ -255,8 +255,8 @@ struct Rounding {
 
 void round_digits(files::CellFile& cell) {
   Rounding rounding;
-  files::visit_cell(rounding, cell.parameters);
-  for (files::TemperatureTable& at : cell.at_temperature) files::visit_rc(rounding, at.rc);
+  model::visit_cell(rounding, cell.parameters);
+  for (files::TemperatureTable& at : cell.at_temperature) model::visit_rc(rounding, at.rc);
   for (model::MechanismSetting& m : cell.mechanisms) {
     for (double& v : m.value) Rounding::number("", v);
   }

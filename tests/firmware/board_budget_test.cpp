@@ -50,9 +50,10 @@ TEST(ForkliftBudgets, Are96KilobytesOfFlashAnd16OfRam) {
   EXPECT_EQ(b.ram, 16U * 1024);
 }
 
-/// What receives an update takes 9 KB of RAM and 2 KiB of stack, for one header. The chip has 128 KiB of RAM and the
-/// stack apart from it; the budgets of board.cmake are those of an image without a slot.
-TEST(ForkliftBudgets, OfAnImageInASlotAre20KilobytesOfRamAndTheStackAboveItsGuard) {
+/// What receives an update takes 9 KB of RAM, and 2 KiB of stack for one header; cell constants of an update take 9 KB
+/// more. The chip has 128 KiB of RAM and the stack apart from it, a slot 256 KiB; the budgets of board.cmake are those
+/// of an image without a slot.
+TEST(ForkliftBudgets, OfAnImageInASlotAre28KilobytesOfRamAndTheStackAboveItsGuard) {
   const auto image =
       images::firmware_image("stm32f405_forklift", files::read_cell("table9"), images::Image::remote_slot_a);
   const ImageSize size = size_of(image);
@@ -62,8 +63,8 @@ TEST(ForkliftBudgets, OfAnImageInASlotAre20KilobytesOfRamAndTheStackAboveItsGuar
   std::printf("in a slot: %zu bytes of flash, %zu of RAM, at worst %u of %u of stack\n",
               static_cast<std::size_t>(size.text + size.data), static_cast<std::size_t>(size.data + size.bss), worst,
               stack);
-  EXPECT_LE(size.text + size.data, 112U * 1024);
-  EXPECT_LE(size.data + size.bss, 20U * 1024);
+  EXPECT_LE(size.text + size.data, 128U * 1024);
+  EXPECT_LE(size.data + size.bss, 28U * 1024);
   EXPECT_LE(worst, stack);
 }
 

@@ -92,7 +92,7 @@ void FlashControllerModel::program_elsewhere(std::uint32_t address, unsigned siz
 }
 
 void FlashControllerModel::erase(std::uint32_t number) {
-  if (number >= 5 && number <= 8 && erase_slot_sector) {
+  if (number >= 5 && number <= 10 && erase_slot_sector) {
     constexpr std::uint32_t slot_sector_bytes = 128 * 1024;
     const std::uint32_t begin = 0x0802'0000 + (number - 5) * slot_sector_bytes;
     ++slot_sectors;

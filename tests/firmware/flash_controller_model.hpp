@@ -23,7 +23,7 @@ class FlashControllerModel {
   /// offset from `memory`; size: bytes at once.
   std::uint32_t read_memory(std::uint32_t offset, unsigned size) const;
   void write_memory(std::uint32_t offset, unsigned size, std::uint32_t value);
-  /// Sectors 5 to 8, the slots of a boot loader, and the one-time memory are executed or read directly; here only the
+  /// Sectors 5 to 10, the slots of a boot loader, and the one-time memory are executed or read directly; here only the
   /// rules apply: what the core is about to store at an address, and what is there. The caller stores.
   void program_elsewhere(std::uint32_t address, unsigned size, std::uint32_t value, std::uint32_t before);
   /// Fills an address range with erased bytes; without it a sector outside the three holds code.

@@ -19,7 +19,7 @@ constexpr std::uint32_t nmi = 2, systick_exception = 15, pvd = 16 + 1, can_tx = 
                         timer_5 = 16 + TimerModel::interrupt_number;
 constexpr std::uint32_t apb1enr = 0x40023840, pwr_cr = 0x40007000;
 constexpr double longest_run_us = 20;  ///< peripherals are asked for interrupts so often
-constexpr std::uint32_t one_time_memory = 0x1FFF7800, slots_begin = 0x08020000, slots_end = 0x080A0000;
+constexpr std::uint32_t one_time_memory = 0x1FFF7800, slots_begin = 0x08020000, slots_end = 0x080E0000;
 
 constexpr std::uint32_t longest_slice = 200;  ///< instructions between an event and its interrupt
 
@@ -55,6 +55,7 @@ void UnicornBoard::map_memories(bool with_slots) {
   if (with_slots) {
     core_.map(code, slots_begin - code, read_and_execute);
     core_.map(slots_begin, slots_end - slots_begin, program_and_execute);
+    core_.write(slots_begin, std::vector<std::uint8_t>(slots_end - slots_begin, 0xFF));
     core_.map(slots_end, 0x08100000 - slots_end, read_and_execute);
   } else {
     core_.map(code, 0x08100000 - code, read_and_execute);

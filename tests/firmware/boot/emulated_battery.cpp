@@ -20,7 +20,7 @@ namespace bms::boot {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-constexpr std::size_t one_time_bytes = 32;
+constexpr std::size_t one_time_bytes = 64;
 
 std::string hex(std::uint64_t value, int bytes) {
   std::string text;
@@ -31,7 +31,7 @@ std::string hex(std::uint64_t value, int bytes) {
 }  // namespace
 
 EmulatedBattery::EmulatedBattery(std::filesystem::path loader) : loader_(std::move(loader)) {
-  files::write_file(slots_file(), std::string(2 * application_slot_bytes + one_time_bytes, '\xFF'));
+  files::write_file(slots_file(), std::string(2 * (application_slot_bytes + cell_slot_bytes) + one_time_bytes, '\xFF'));
   start("power");
 }
 

@@ -65,6 +65,21 @@ class LoaderTest : public ::testing::Test {
     EXPECT_EQ(tool.wait(), expected_exit) << files::read_file(folder.path() / "log");
     return nlohmann::json::parse(files::read_file(folder.path() / "json"));
   }
+  /// bms update of a table of trucks. Returns state and version of each truck, in words.
+  std::string update_depot(const fs::path& file, int expected_exit) {
+    images::ChildProcess tool(
+        {BMS_TOOL, "update", (folder.path() / "depot.csv").string(), file.string(), "--wait", "100", "--out",
+         (folder.path() / "runs.csv").string(), "--json", (folder.path() / "json").string()},
+        folder.path() / "log");
+    EXPECT_TRUE(battery.run_until([&] { return !tool.running(); }, 150));
+    EXPECT_EQ(tool.wait(), expected_exit) << files::read_file(folder.path() / "log");
+    const auto result = nlohmann::json::parse(files::read_file(folder.path() / "json"));
+    std::string text;
+    for (const auto& truck : result.at("trucks"))
+      text += fmt::format("{} {} {};", truck.at("truck").get<std::string>(), truck.at("state").get<std::string>(),
+                          truck.at("runs").get<std::string>());
+    return text;
+  }
 
   files::TemporaryFolder folder;
   EmulatedBattery battery{Depot::get().loader};
@@ -88,6 +103,28 @@ TEST_F(LoaderTest, TheSecondImageGoesToTheOtherSlotAndTheFirstOneStays) {
   EXPECT_TRUE(battery.slot(0) == first);
   EXPECT_EQ(update(Depot::get().release("0.4.0")).at("from"), "0.3.0");  // overwrites slot A
   EXPECT_FALSE(battery.slot(0) == first);
+}
+
+TEST_F(LoaderTest, ADepotIsUpdatedOneTruckAtATimePerBusAndContinues) {
+  files::write_file(
+      folder.path() / "depot.csv",
+      fmt::format("truck,bus,key\nnorth,slcan:{0},\neast,slcan:/dev/no_adapter,\nsouth,slcan:{0},\n", battery.line()));
+  const fs::path release = Depot::get().release("0.2.0");
+  EXPECT_EQ(update_depot(release, 1), "north done 0.2.0;east refused ;south waiting ;");
+  const std::string first = files::read_file(folder.path() / "runs.csv");
+  EXPECT_NE(first.find("/dev/no_adapter"), std::string::npos) << first;
+
+  // the next truck on this bus: its battery is empty
+  const std::string of_north = battery.slot(0);
+  for (const unsigned slot : {0U, 1U}) battery.write_slot(slot, std::string(application_slot_bytes, '\xFF'));
+  battery.cut_power();
+  EXPECT_EQ(update_depot(release, 1), "north done 0.2.0;east refused ;south done 0.2.0;");
+  EXPECT_TRUE(battery.slot(0).substr(0, 4'096) == of_north.substr(0, 4'096)) << "the same image";
+
+  // nothing is left to do on this bus
+  const unsigned starts = battery.starts();
+  EXPECT_EQ(update_depot(release, 1), "north done 0.2.0;east refused ;south done 0.2.0;");
+  EXPECT_EQ(battery.starts(), starts);
 }
 
 TEST_F(LoaderTest, WhatIsRefusedHasItsReasonAndChangesNothing) {

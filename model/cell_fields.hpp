@@ -3,7 +3,7 @@
 
 #include "model/cell_parameters.hpp"
 
-namespace bms::files {
+namespace bms::model {
 
 /// Keys of an RC table: [rc] and each [[at_temperature]].
 template <class Visitor, class Table>
@@ -18,10 +18,10 @@ void visit_rc(Visitor& visitor, Table& rc) {
 }
 
 /// Returns true if the range states anything.
-inline bool is_known(const model::IdentifiedRange& r) {
+inline bool is_known(const IdentifiedRange& r) {
   for (const double v :
        {r.temperature_min_c, r.temperature_max_c, r.soc_min, r.soc_max, r.current_max_a, r.duration_s}) {
-    if (v != model::IdentifiedRange::unknown) return true;
+    if (v != IdentifiedRange::unknown) return true;
   }
   return false;
 }
@@ -32,7 +32,7 @@ inline bool is_known(const model::IdentifiedRange& r) {
 template <class Visitor, class Parameters>
 void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("capacity_ah", p.capacity_ah);
-  visitor.optional_number("reference_temperature_c", p.reference_temperature_c, model::default_reference_temperature_c);
+  visitor.optional_number("reference_temperature_c", p.reference_temperature_c, default_reference_temperature_c);
 
   visitor.table("limits");
   visitor.number("voltage_min_v", p.limits.voltage_min_v);
@@ -71,10 +71,10 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   visitor.number("resistance_fraction", p.tolerance.resistance_fraction);
   visitor.number("initial_soc", p.tolerance.initial_soc);
   visitor.number("drift_v", p.tolerance.drift_v);
-  visitor.optional_number("resistance_per_ev", p.tolerance.resistance_per_ev, model::default_resistance_per_ev);
+  visitor.optional_number("resistance_per_ev", p.tolerance.resistance_per_ev, default_resistance_per_ev);
 
   if (visitor.optional_table("range", is_known(p.range))) {
-    constexpr double unknown = model::IdentifiedRange::unknown;
+    constexpr double unknown = IdentifiedRange::unknown;
     visitor.optional_number("temperature_min_c", p.range.temperature_min_c, unknown);
     visitor.optional_number("temperature_max_c", p.range.temperature_max_c, unknown);
     visitor.optional_number("soc_min", p.range.soc_min, unknown);
@@ -84,4 +84,4 @@ void visit_cell(Visitor& visitor, Parameters& p) {
   }
 }
 
-}  // namespace bms::files
+}  // namespace bms::model
