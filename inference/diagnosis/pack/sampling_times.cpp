@@ -97,6 +97,10 @@ Estimated span_within_row(double linear_s, double step_s) {
   return {(linear_s + longest_s) / 2, std::max(width_s * sigma_of_uniform, of_times.unknown * (linear_s - step_s))};
 }
 
+Estimated span_of_readings(const Estimated& one_step) {
+  return {one_step.value / 2, std::hypot(one_step.value * sigma_of_uniform, one_step.sigma)};
+}
+
 std::optional<Estimated> sampling_span(const Track& track, const PackRecording& pack,
                                        const std::vector<std::size_t>& cells) {
   const std::vector<std::size_t> steps = lone_steps(track, pack);
@@ -129,7 +133,10 @@ std::optional<PackFinding> staggered_channels(const Track& track, const PackReco
   if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
   PackFinding f;
   f.cause = Cause::staggered;
-  const Estimated span = sampling_span(track, pack, cells).value_or(span_within_row(span_of(delays), track.step_s));
+  const double linear_s = span_of(delays);
+  const std::optional<Estimated> of_steps = sampling_span(track, pack, cells);
+  const Estimated span = pack.single_readings ? span_of_readings(of_steps.value_or(Estimated{linear_s, 0}))
+                                              : of_steps.value_or(span_within_row(linear_s, track.step_s));
   f.value = span.value;
   f.sigma = std::hypot(span.sigma, sigma, limits.spread[delay].scale * f.value);
   f.gain = spread / sigma;

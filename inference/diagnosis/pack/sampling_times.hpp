@@ -27,8 +27,13 @@ bool steps_stand_alone(const Track& track, const PackRecording& pack);
 /// channels are read within a row of step_s. Every time between is as probable.
 Estimated span_within_row(double linear_s, double step_s);
 
-/// From the first to the last one of these cells' channels [s]. Nothing if most steps of the current do not stand
-/// alone: then, what happened within a row is unknown.
+/// The same of single readings of the current: that they are equal does not show that the current was constant between
+/// them. With n steps in each row a channel that is read late misses n times as many as with the one step that one_step
+/// is for, so that it is the longest time. Every shorter one is as probable.
+Estimated span_of_readings(const Estimated& one_step);
+
+/// From the first to the last one of these cells' channels [s], of means or of readings with one step in a row. Nothing
+/// if most steps of the current do not stand alone: then, what happened within a row is unknown.
 std::optional<Estimated> sampling_span(const Track& track, const PackRecording& pack,
                                        const std::vector<std::size_t>& cells);
 
