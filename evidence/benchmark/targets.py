@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The tables of targets: what targets.toml asks for, next to what was measured last. All of them stand in README.md, those
-of real cells also at the top of inference/diagnosis/README.md.
+"""The tables of targets: what targets.toml asks for, next to what was measured last. All of them stand in README.md,
+those of real cells also at the top of inference/diagnosis/README.md.
 
   targets.py keep RESULT.json --command TEXT [--on TEXT]   takes the figures of a result into measured.json
   targets.py write                                         writes the tables

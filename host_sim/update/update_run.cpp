@@ -17,7 +17,7 @@ using Bytes = Link::Bytes;
 
 constexpr std::size_t piece_bytes = 1'024;
 constexpr int most_tries = 5;
-constexpr std::size_t earliest_state_bytes = 24;          // without the time since the start
+constexpr std::size_t earliest_state_bytes = 24;  // without the time since the start
 constexpr std::uint8_t negative = 0x7F, pending = 0x78;
 
 std::uint64_t now_us() {
