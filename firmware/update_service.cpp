@@ -57,7 +57,7 @@ void UpdateService::start(std::uint32_t starts, std::uint32_t operating_s) {
     cell_ = *cell;
     cell_battery_ = boot::for_cells(battery_, cells_, firmware::cell_hash_of_build());
     cell_battery_.content = check_cell_constants;
-    cells.emplace(cells_, cell_battery_, cell_);
+    cells.emplace(boot::CellSlots{cells_, cell_battery_, cell_});
   }
   server_.emplace(slots_, battery_, started_, service_key(device), *this, boot::check_fields_and_key, cells);
   if (cell_.found) use_cell();

@@ -29,7 +29,7 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
     cell = bench.reset_cell(power_on, started_.trial);
     if (cell.trial && !healthy) cell = bench.reset_cell(false);
     std::optional<CellSlots> slots;
-    if (knows_cells) slots.emplace(bench.cells(), bench.cell_battery(), cell);
+    if (knows_cells) slots.emplace(CellSlots{bench.cells(), bench.cell_battery(), cell});
     server_ = std::make_unique<UpdateServer>(bench.slots(), bench.battery(), started_, std::nullopt, *this,
                                              check_header, slots);
     if (cell.found && !usable) server_->cell_refused(Refusal::other_model);

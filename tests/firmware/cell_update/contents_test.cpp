@@ -168,7 +168,6 @@ TEST(CellConstants, EachRefusalHasItsReason) {
 
 TEST(CellConstants, OfAnotherModelAreRefused) {
   const files::CellFile plain = files::read_cell("a123_26650"), extended = files::read_cell("a123_26650_extended");
-  Plain of_plain;
   Extended of_extended;
   ASSERT_EQ(read(of_extended, payload_of(extended, extended), extended), Refusal::none);
   files::CellFile like_extended = plain;
