@@ -110,7 +110,7 @@ const Update& the_update() {
       if (first_bit == 0) first_bit = last_bit;
     };
     wish.containers = u.images;
-    wish.start_wait_s = 300;
+    wish.start_wait_s = wish.restart_wait_s = wish.sample_wait_s = 300;  // the board may be slower than the clock
     const double began_ms = battery.board.now_ms();
     u.result = run_update(bus, wish);
     u.seconds = 1e-3 * (battery.board.now_ms() - began_ms);
