@@ -14,6 +14,7 @@ struct ReceiverTarget {
   SlotFlash* flash;
   const Battery* battery;
   std::uint8_t running;  ///< the slot that may not be written; 2 if none runs
+  std::uint8_t slot() const { return running == 0 ? 1 : 0; }
 };
 
 class Receiver {
@@ -30,7 +31,7 @@ class Receiver {
     received_ = 0;
   }
   Kind kind() const { return to_.battery->kind; }
-  std::uint8_t target() const { return to_.running == 0 ? 1 : 0; }
+  std::uint8_t target() const { return to_.slot(); }
   /// Erases the target, which takes seconds, or asks the loader for it: erase_at_restart. A slot that is erased already
   /// stays as it is. Refuses while the running image is on trial.
   Refusal prepare();

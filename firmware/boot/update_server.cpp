@@ -185,14 +185,22 @@ void UpdateServer::refuse(Answer& answer, Refusal why) {
   answer.reject(waits ? conditions_not_correct : not_accepted);
 }
 
-/// False if this battery has no slots of that kind.
-bool UpdateServer::aim_at(Kind kind) {
-  if (kind != Kind::application && (kind != Kind::cell || !cells_)) return false;
-  if (kind == receiver_.kind()) return true;
-  receiver_.aim_at(kind == Kind::application
-                       ? application_
-                       : ReceiverTarget{&cells_->flash, &cells_->battery, running_slot(cells_->started)});
-  return true;
+/// Nothing if this battery has no slots of that kind.
+std::optional<ReceiverTarget> UpdateServer::target_of(Kind kind) const {
+  if (kind == Kind::application) return application_;
+  if (kind != Kind::cell || !cells_) return std::nullopt;
+  return ReceiverTarget{&cells_->flash, &cells_->battery, running_slot(cells_->started)};
+}
+
+Refusal UpdateServer::erase(Kind kind) {
+  const auto to = target_of(kind);
+  if (!to) return Refusal::other_kind;
+  if (!surroundings_.at_rest()) return Refusal::not_at_rest;
+  if (may_not_begin(kind)) return Refusal::not_confirmed;
+  download_ = exited_ = false;
+  if (kind != receiver_.kind()) receiver_.aim_at(*to);
+  completed_.reset();
+  return receiver_.prepare();
 }
 
 void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer) {
@@ -210,18 +218,13 @@ void UpdateServer::routine(std::span<const std::uint8_t> request, Answer& answer
   if (request.size() != 4 && (request.size() != 5 || which != 0xFF00)) return answer.reject(wrong_length);
   Refusal why = Refusal::none;
   if (which == 0xFF00) {
-    download_ = exited_ = false;
-    if (!aim_at(request.size() == 5 ? static_cast<Kind>(request[4]) : Kind::application))
-      why = Refusal::other_kind;
-    else if (!surroundings_.at_rest())
-      why = Refusal::not_at_rest;
-    else
-      why = on_trial() ? Refusal::not_confirmed : receiver_.prepare();
+    why = erase(request.size() == 5 ? static_cast<Kind>(request[4]) : Kind::application);
   } else if (which == 0xFF01) {
     if (!exited_) return answer.reject(wrong_order);
     if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
     exited_ = false;
     why = receiver_.finish();
+    if (why == Refusal::none) completed_ = receiver_.kind();
   } else {
     return answer.reject(out_of_range);
   }
@@ -234,16 +237,21 @@ void UpdateServer::request_download(std::span<const std::uint8_t> request, Answe
   if (request.size() != 11 || request[1] != 0 || request[2] != 0x44) return answer.reject(out_of_range);
   if (!surroundings_.at_rest()) return refuse(answer, Refusal::not_at_rest);
   const std::uint32_t address = big(request, 3, 4), bytes = big(request, 7, 4);
-  if (!aim_at(address >= cell_slots[0] ? Kind::cell : Kind::application)) return refuse(answer, Refusal::other_kind);
-  const std::uint32_t begin = slot_begin(receiver_.kind(), receiver_.target());
-  exited_ = false;
+  const Kind kind = address >= cell_slots[0] ? Kind::cell : Kind::application;
+  const auto to = target_of(kind);
+  if (!to) return refuse(answer, Refusal::other_kind);
+  const std::uint32_t begin = slot_begin(kind, to->slot());
+  const bool goes_on = kind == receiver_.kind() && receiver_.active() && receiver_.received() > 0 &&
+                       address == begin + receiver_.received();
   if (address == begin) {
-    if (on_trial()) return refuse(answer, Refusal::not_confirmed);
+    if (may_not_begin(kind)) return refuse(answer, Refusal::not_confirmed);
+    if (kind != receiver_.kind()) receiver_.aim_at(*to);
     if (const Refusal why = receiver_.begin(bytes); why != Refusal::none) return refuse(answer, why);
-  } else if (!receiver_.active() || receiver_.received() == 0 || address != begin + receiver_.received()) {
-    const bool other = address == slot_begin(receiver_.kind(), static_cast<std::uint8_t>(1 - receiver_.target()));
+  } else if (!goes_on) {
+    const bool other = address == slot_begin(kind, static_cast<std::uint8_t>(1 - to->slot()));
     return refuse(answer, other ? Refusal::not_from_the_other_slot : Refusal::incomplete);
   }
+  exited_ = false;
   download_ = true;
   blocks_ = 0;
   answer.put(0x20).put(IsoTp::longest, 2);

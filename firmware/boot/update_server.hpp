@@ -113,7 +113,12 @@ class UpdateServer {
   bool unlocked() const { return programming_ && (unlocked_ || !key_); }
   /// Neither slot is written while the other one returns if a trial fails.
   bool on_trial() const { return started_.trial || (cells_ && cells_->started.trial); }
-  bool aim_at(Kind kind);
+  /// What was received completely starts on trial at the next reset. Nothing of the other kind begins before: of two
+  /// that start on trial together nobody could say which one failed, and the tool would not know which one it waits
+  /// for.
+  bool may_not_begin(Kind kind) const { return on_trial() || (completed_ && *completed_ != kind); }
+  std::optional<ReceiverTarget> target_of(Kind kind) const;
+  Refusal erase(Kind kind);
   static constexpr std::uint8_t running_slot(const Start& started) { return started.found ? started.slot : 2; }
 
   ReceiverTarget application_;
@@ -128,6 +133,7 @@ class UpdateServer {
   std::uint32_t blocks_ = 0;  ///< of this download
   Refusal refusal_;           ///< at first that of the start: why the newest image does not run
   std::optional<CellSlots> cells_;
+  std::optional<Kind> completed_;  ///< received and checked since this start
 };
 
 /// Server and transport together: frames in, frames out.

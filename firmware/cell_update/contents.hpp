@@ -1,8 +1,9 @@
 // Reads cell constants of an update for an application, with the checks that its build makes of its own cell file.
 //
 // What protects does not travel: limits and capacity, from which the protection plan of the build follows and for which
-// it is proved, must be those of the build, bit for bit. So a wrong or malicious update can make an estimate wrong, and
-// no limit wider. Another cell, or other limits, needs another application.
+// it is proved, must be those of the build, bit for bit. So a wrong or malicious update moves no threshold. It can make
+// an estimate wrong, and with it the allowed currents, which follow the model below the continuous limits. Another
+// cell, or other limits, needs another application.
 #pragma once
 
 #include <algorithm>
@@ -39,6 +40,7 @@ template <class S, class Law>
 using Mechanism = typename MechanismOf<S, Law, model::Catalogue>::type;
 
 constexpr bool same(const model::Limits& a, const model::Limits& b) {
+  static_assert(sizeof(model::Limits) == 6 * sizeof(double), "compare every limit");
   return a.voltage_min_v == b.voltage_min_v && a.voltage_max_v == b.voltage_max_v &&
          a.charge_current_max_a == b.charge_current_max_a && a.discharge_current_max_a == b.discharge_current_max_a &&
          a.temperature_min_c == b.temperature_min_c && a.temperature_max_c == b.temperature_max_c;

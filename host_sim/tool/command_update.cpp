@@ -108,20 +108,23 @@ class UpdateCommand final : public Command {
               board));
     const auto refuse = [&](const std::string& what) { throw files::BadInput(o_.replayed, 1, what); };
     const auto report = nlohmann::json::parse(files::read_file(o_.replayed), nullptr, false);
-    if (!report.is_object() || report.value("command", "") != "replay" || !report.contains("against_cell_hash") ||
-        !report.contains("faults") || !report.contains("cut_off_at_s"))
+    const auto text = [&](const char* key) {
+      return report.contains(key) && report[key].is_string() ? report[key].get<std::string>() : std::string();
+    };
+    const auto cut_off = report.is_object() ? report.value("cut_off_at_s", nlohmann::json()) : nlohmann::json();
+    if (!report.is_object() || text("command") != "replay" || !report.contains("faults") ||
+        !report["faults"].is_array() || !cut_off.is_object() || !cut_off.contains("before") ||
+        !cut_off.contains("after") || !report.contains("samples") || !report["samples"].is_number())
       refuse("expected the JSON of bms replay --against");
-    if (report.value("board", "") != board || report.value("against_cell_hash", "") != cell ||
-        report.value("samples", 0.0) <= 0)
-      refuse(fmt::format("is a replay of the cell file {} on {}, expected {} on {}",
-                         report.value("against_cell_hash", ""), report.value("board", ""), cell, board));
-    const auto& cut_off = report["cut_off_at_s"];
+    if (text("board") != board || text("against_cell_hash") != cell || report["samples"] <= 0)
+      refuse(fmt::format("is a replay of the cell file {} on {}, expected {} on {}", text("against_cell_hash"),
+                         text("board"), cell, board));
     if (!o_.other_faults && (!report["faults"].empty() || cut_off["before"] != cut_off["after"]))
       refuse(
           "shows other faults with the new cell file, or contactors that open at another time, expected the same, or "
           "--other-faults if that is what the new cell file is for");
-    print_summary(o_.output, fmt::format("{}", report.value("statement", "")));
-    wish.gate = [before = report.value("cell_hash", "")](std::uint32_t acting) {
+    print_summary(o_.output, text("statement"));
+    wish.gate = [before = text("cell_hash")](std::uint32_t acting) {
       const std::string acts = fmt::format("{:08x}", acting);
       if (acts == before) return std::string();
       return fmt::format("the replay compares with the cell file {}, but {} acts in this battery", before, acts);
@@ -145,8 +148,12 @@ class UpdateCommand final : public Command {
     nlohmann::ordered_json json{{"command", "update"}, {"trucks", nlohmann::ordered_json::array()}};
     bool all_done = true;
     for (const auto& row : rows) {
-      json["trucks"].push_back(
-          {{"truck", row.truck}, {"bus", row.bus}, {"state", row.state}, {"runs", row.runs}, {"reason", row.reason}});
+      json["trucks"].push_back({{"truck", row.truck},
+                                {"bus", row.bus},
+                                {"state", row.state},
+                                {"runs", row.runs},
+                                {"cell", row.cell},
+                                {"reason", row.reason}});
       all_done = all_done && row.state == "done";
     }
     if (!o_.output.json.empty()) write_output(o_.output.json, json.dump(2) + "\n");

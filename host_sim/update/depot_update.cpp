@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using files::BadInput;
 
-constexpr const char* columns = "truck,bus,state,runs,image,reason";
+constexpr const char* columns = "truck,bus,state,runs,cell,image,reason";
 
 /// A table with a header; lines that are empty or begin with # are no rows.
 class Table {
@@ -66,7 +66,7 @@ void write_rows(const fs::path& out, const std::vector<TruckRow>& rows) {
   std::string text = std::string(columns) + "\n";
   for (const TruckRow& r : rows) {
     const char* separator = "";
-    for (const std::string* field : {&r.truck, &r.bus, &r.state, &r.runs, &r.image, &r.reason}) {
+    for (const std::string* field : {&r.truck, &r.bus, &r.state, &r.runs, &r.cell, &r.image, &r.reason}) {
       text += separator + fleet::csv_field(*field);
       separator = ",";
     }
@@ -103,7 +103,8 @@ std::vector<TruckRow> read_rows(const fs::path& path) {
   std::vector<TruckRow> rows;
   for (const auto& row : table.rows()) {
     rows.push_back({table.field(row, "truck"), table.field(row, "bus"), table.field(row, "state"),
-                    table.field(row, "runs"), table.field(row, "image"), table.field(row, "reason")});
+                    table.field(row, "runs"), table.field(row, "cell"), table.field(row, "image"),
+                    table.field(row, "reason")});
   }
   return rows;
 }
@@ -115,8 +116,11 @@ std::vector<TruckRow> update_trucks(const std::vector<Truck>& trucks, const std:
   std::map<std::string, std::size_t> next_of_bus;
   for (const Truck& truck : trucks) {
     const auto before = std::ranges::find(earlier, truck.name, &TruckRow::truck);
-    rows.push_back({truck.name, truck.bus, "waiting", "", image, ""});
-    if (before != earlier.end()) rows.back().runs = before->runs;
+    rows.push_back({truck.name, truck.bus, "waiting", "", "", image, ""});
+    if (before != earlier.end()) {
+      rows.back().runs = before->runs;
+      rows.back().cell = before->cell;
+    }
     if (before != earlier.end() && before->state == "done" && before->image == image)
       rows.back() = *before;
     else
@@ -132,10 +136,9 @@ std::vector<TruckRow> update_trucks(const std::vector<Truck>& trucks, const std:
         const UpdateResult result = update(trucks[k]);
         row.state = name_of(result.outcome);
         row.reason = result.reason;
-        if (result.outcome == UpdateResult::Outcome::done)
-          row.runs = result.to;
-        else if (!result.from.empty())
-          row.runs = result.from;
+        const bool of_cell = result.kind == boot::Kind::cell, is_done = result.outcome == UpdateResult::Outcome::done;
+        if (!result.from.empty()) (of_cell ? row.cell : row.runs) = is_done ? result.to : result.from;
+        if (!of_cell && is_done) row.cell.clear();  // constants are for one application
       } catch (const std::exception& error) {
         row.state = "refused";
         row.reason = error.what();

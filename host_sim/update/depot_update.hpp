@@ -32,6 +32,7 @@ std::vector<Truck> read_trucks(const std::filesystem::path& table);
 struct TruckRow {
   std::string truck, bus, state;  ///< state: done, refused, returned, waiting
   std::string runs;               ///< version; empty: not known
+  std::string cell;               ///< cell file of an update that acts; empty: not known, or that of the build
   std::string image;              ///< SHA-256 of the file that was sent
   std::string reason;
 };

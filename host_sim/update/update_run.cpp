@@ -73,6 +73,7 @@ class Update {
       const auto before = read_until_answered();  // it may be starting
       if (!before) throw Refused{"no battery answers, or it has no boot loader"};
       state_ = *before;
+      result_.kind = kind();
       result_.from = version_text(state_.version);
       if (of_cell()) prepare_cell();
       choose();
@@ -222,7 +223,8 @@ class Update {
   /// a battery that does not state it another slot, a trial or a return shows it.
   void restart() {
     const auto before = read_until_answered();
-    const auto cell_before = before && of_cell() ? read_cell_state(link_) : std::nullopt;
+    std::optional<CellState> cell_before;
+    if (before && of_cell()) cell_before = read_cell_state(link_);
     if (!before || (of_cell() && !cell_before))
       throw Refused{"the battery does not answer any more; send again, the transfer resumes"};
     expect({0x11, 0x01});
@@ -236,12 +238,15 @@ class Update {
       const auto now = read_state(link_);
       restarted = restarted || (now && (up_ms && now->up_ms ? *now->up_ms < *up_ms : differs(*now)));
       if (now) up_ms = now->up_ms;
-      const auto cell = now && of_cell() ? read_cell_state(link_) : std::nullopt;
-      restarted = restarted || (cell && differ(*cell_before, *cell));
+      if (now && cell_before) {
+        if (const auto cell = read_cell_state(link_)) {
+          restarted = restarted || differ(*cell_before, *cell);
+          if (restarted && !cell->trial) return decide(*cell);
+        }
+      }
       if (now && !restarted && Clock::now() - begin > std::chrono::duration<double>(wish_.restart_wait_s))
         throw Refused{"the battery has not restarted: the image is complete and starts at its next restart"};
       if (now && restarted && !now->trial && !of_cell()) return decide(*now);
-      if (restarted && cell && !cell->trial) return decide(*cell);
       wish_.pause();
     }
     throw Refused{restarted ? "the new image was started and has not confirmed itself yet"

@@ -71,6 +71,7 @@ struct UpdateWish {
 
 struct UpdateResult {
   enum class Outcome { done, refused, returned } outcome = Outcome::refused;
+  boot::Kind kind = boot::Kind::application;
   std::string from, to, reason;  ///< versions; of cell constants "cell " and the hash of the cell file
   double seconds = 0;
   std::uint32_t sent = 0, resumed_at = 0;  ///< bytes

@@ -213,8 +213,9 @@ const ByPointer& calls_by_pointer() {
       {"bms::hal::dispatch_frame", {"bms::firmware::UpdateService::receive"}},
       {"mbedtls_platform_zeroize", {"memset"}},
       {"bms::boot::",
-       {"bms::boot::ChipSlots::", "bms::boot::check_fields_and_key(", "bms::firmware::UpdateService::at_rest",
-        "bms::firmware::UpdateService::challenge", "bms::firmware::UpdateService::restart("}},
+       {"bms::boot::ChipSlots::", "bms::boot::check_fields_and_key(", "bms::firmware::check_cell_constants",
+        "bms::firmware::UpdateService::at_rest", "bms::firmware::UpdateService::challenge",
+        "bms::firmware::UpdateService::restart("}},
       {"__gnu_thumb1_case_", {}}};
   return known;
 }

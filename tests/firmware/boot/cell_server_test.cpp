@@ -18,6 +18,7 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
   }
 
   bool rest = true, healthy = true, usable = true, knows_cells = true, application_on_trial = false;
+  bool confirms = true;       ///< constants on trial at once
   bool answers_late = false;  ///< after a restart: no sooner than its last start was ago
   CellBench bench;
   Start cell;
@@ -33,7 +34,7 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
     server_ = std::make_unique<UpdateServer>(bench.slots(), bench.battery(), started_, std::nullopt, *this,
                                              check_header, slots);
     if (cell.found && !usable) server_->cell_refused(Refusal::other_model);
-    if (cell.trial && healthy && usable) {
+    if (cell.trial && healthy && usable && confirms) {
       confirm(bench.cells(), cell.slot, cell.header.security_version);
       server_->confirmed();
     }
@@ -90,6 +91,7 @@ class CellServerTest : public ::testing::Test {
   }
   update::UpdateResult run(const update::UpdateWish& w) { return run_update(battery_, w); }
   using Outcome = update::UpdateResult::Outcome;
+  using Bytes = update::Link::Bytes;
 
   BatteryWithCells battery_;
 };
@@ -170,7 +172,6 @@ TEST_F(CellServerTest, AServerWithoutCellsRefusesTheirSlotsAndTheirKind) {
   battery_.knows_cells = false;
   battery_.start(true);
   update::Link link(battery_);
-  using Bytes = update::Link::Bytes;
   ASSERT_EQ(link.request({0x10, 0x02})->at(0), 0x50);
   EXPECT_EQ(*link.request({0x31, 0x01, 0xFF, 0x00, 2}), (Bytes{0x7F, 0x31, 0x70}));
   EXPECT_EQ(link.request({0x22, 0xF1, 0xA4})->at(3), static_cast<std::uint8_t>(Refusal::other_kind));
@@ -190,6 +191,53 @@ TEST_F(CellServerTest, NeitherKindIsReceivedWhileOneIsOnTrial) {
   ASSERT_TRUE(prepare(battery_.bench.cells(), 0));
   EXPECT_EQ((*link.request({0x34, 0x00, 0x44, 0x08, 0x0A, 0, 0, 0, 0, 0x10, 0}))[2], 0x22)
       << "nor into a slot that was erased before";
+}
+
+TEST_F(CellServerTest, NeitherKindIsReceivedWhileConstantsAreOnTrial) {
+  battery_.confirms = false;
+  ASSERT_EQ(battery_.bench.transfer_cell(cell({})), Refusal::none);
+  battery_.start(false);
+  ASSERT_TRUE(battery_.cell.trial);
+  update::Link link(battery_);
+  ASSERT_EQ(link.request({0x10, 0x02})->at(0), 0x50);
+  for (const std::uint8_t kind : {std::uint8_t{1}, std::uint8_t{2}}) {
+    EXPECT_EQ((*link.request({0x31, 0x01, 0xFF, 0x00, kind}))[2], 0x22);
+    EXPECT_EQ(link.request({0x22, 0xF1, 0xA4})->at(3), static_cast<std::uint8_t>(Refusal::not_confirmed));
+  }
+}
+
+TEST_F(CellServerTest, NothingOfTheOtherKindBeginsBeforeWhatIsCompleteWasStarted) {
+  update::Link link(battery_);
+  const auto accepted = [&](Bytes message) {
+    const auto answer = link.request(message, 10'000);
+    return answer && answer->at(0) == (message[0] | 0x40);
+  };
+  const std::string container = cell({});
+  const auto bytes = static_cast<std::uint32_t>(container.size());
+  Bytes download{0x34, 0x00, 0x44};
+  for (const std::uint32_t number : {slot_begin(Kind::cell, 0), bytes}) {
+    for (int shift = 24; shift >= 0; shift -= 8) download.push_back(static_cast<std::uint8_t>(number >> shift));
+  }
+  const auto send = [&] {
+    EXPECT_TRUE(accepted({0x31, 0x01, 0xFF, 0x00, 2}) && accepted(download));
+    for (std::uint32_t at = 0, sequence = 1; at < bytes; at += 1'000, ++sequence) {
+      Bytes piece{0x36, static_cast<std::uint8_t>(sequence)};
+      for (const char c : container.substr(at, 1'000)) piece.push_back(static_cast<std::uint8_t>(c));
+      EXPECT_TRUE(accepted(piece));
+    }
+    EXPECT_TRUE(accepted({0x37}));
+  };
+  ASSERT_TRUE(accepted({0x10, 0x02}));
+  send();
+  EXPECT_TRUE(accepted({0x31, 0x01, 0xFF, 0x00, 1})) << "not yet complete";
+  send();
+  ASSERT_TRUE(accepted({0x31, 0x01, 0xFF, 0x01}));
+  EXPECT_FALSE(accepted({0x31, 0x01, 0xFF, 0x00, 1}));
+  EXPECT_EQ(link.request({0x22, 0xF1, 0xA4})->at(3), static_cast<std::uint8_t>(Refusal::not_confirmed));
+  EXPECT_TRUE(read_marks(battery_.bench.cells(), 0).complete);
+  battery_.start(false);
+  ASSERT_TRUE(accepted({0x10, 0x02}));
+  EXPECT_TRUE(accepted({0x31, 0x01, 0xFF, 0x00, 1})) << "started and confirmed";
 }
 
 TEST(CellHandover, OfALoaderWithoutCellsSaysNothing) {

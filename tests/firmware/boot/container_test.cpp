@@ -113,7 +113,7 @@ TEST(Refusals, HaveTheirNumbersAndWords) {
   EXPECT_EQ(static_cast<int>(Refusal::not_at_rest), 15);
   EXPECT_EQ(static_cast<int>(Refusal::erase_at_restart), 23);
   EXPECT_EQ(words_for(Refusal::trial_failed), "the image was started on trial and did not confirm itself");
-  EXPECT_EQ(words_for(static_cast<Refusal>(24)), "refused for a reason that this tool lacks");
+  EXPECT_EQ(words_for(static_cast<Refusal>(refusal_words.size())), "refused for a reason that this tool lacks");
 }
 
 }  // namespace

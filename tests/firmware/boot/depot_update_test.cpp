@@ -32,6 +32,7 @@ class DepotUpdate : public ::testing::Test {
           worked_on.push_back(truck.name);
           if (truck.name == broken) throw std::runtime_error("the adapter is gone");
           UpdateResult r;
+          r.kind = kind;
           r.from = "0.2.0";
           r.to = "0.3.0";
           r.outcome = truck.name == returns ? UpdateResult::Outcome::returned : UpdateResult::Outcome::done;
@@ -46,6 +47,7 @@ class DepotUpdate : public ::testing::Test {
   std::mutex mutex;
   std::vector<std::string> worked_on;
   std::string broken, returns;
+  boot::Kind kind = boot::Kind::application;
 };
 
 TEST_F(DepotUpdate, ReadsTheManifestOfTheFleet) {
@@ -75,14 +77,31 @@ TEST_F(DepotUpdate, OneTruckOfABusIsUpdatedInARunAndTheNextOneInTheNext) {
   EXPECT_THAT(worked_on, UnorderedElementsAre("T1", "T2"));
   EXPECT_EQ(rows[0].state, "done");
   EXPECT_EQ(rows[2].state, "waiting");
-  EXPECT_THAT(out(), HasSubstr("T3,can0,waiting,,image 1,"));
+  EXPECT_THAT(out(), HasSubstr("T3,can0,waiting,,,image 1,"));
   rows = run(list);
   EXPECT_THAT(worked_on, ElementsAre("T3"));
   EXPECT_EQ(rows[2].state, "done");
   EXPECT_EQ(rows[2].runs, "0.3.0");
   run(list);
   EXPECT_THAT(worked_on, IsEmpty());
-  EXPECT_THAT(out(), HasSubstr("T1,can0,done,0.3.0,image 1,"));
+  EXPECT_THAT(out(), HasSubstr("T1,can0,done,0.3.0,,image 1,"));
+}
+
+TEST_F(DepotUpdate, CellConstantsStandNextToTheVersionUntilAnotherImageEndsThem) {
+  const auto list = table("truck,bus\nT1,can0\n");
+  run(list);
+  kind = boot::Kind::cell;
+  auto rows = run(list, "constants");
+  EXPECT_EQ(rows[0].cell, "0.3.0") << "what the result says acts";
+  EXPECT_EQ(rows[0].runs, "0.3.0");
+  returns = "T1";
+  rows = run(list, "other constants");
+  EXPECT_EQ(rows[0].cell, "0.2.0") << "the old ones";
+  kind = boot::Kind::application;
+  returns = "";
+  rows = run(list, "image 2");
+  EXPECT_EQ(rows[0].cell, "");
+  EXPECT_EQ(rows[0].runs, "0.3.0");
 }
 
 TEST_F(DepotUpdate, AnotherImageIsSentToAllAgain) {

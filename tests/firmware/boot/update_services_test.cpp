@@ -105,7 +105,7 @@ TEST_F(UpdateServices, WhatIsWrittenWronglyHasItsCode) {
   compressed[1] = 0x11;
   for (const auto& [request, answer] : std::vector<Exchange>{
            {{0x31, 1, 0xFF}, refused(0x31, 0x13)},
-           {{0x31, 1, 0xFF, 0, 0}, refused(0x31, 0x13)},
+           {{0x31, 1, 0xFF, 0, 1, 1}, refused(0x31, 0x13)},
            {{0x31, 2, 0xFF, 0}, refused(0x31, 0x12)},
            {{0x31, 1, 0xFF, 2}, refused(0x31, 0x31)},
            {{0x31, 1, 2, 3}, refused(0x31, 0x13)},
