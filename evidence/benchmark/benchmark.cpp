@@ -91,7 +91,10 @@ std::string json_of(const Options& options, const std::vector<Column>& columns) 
   json["split"] = options.split;
   json["seed"] = options.seed;
   json["first"] = options.first;
-  json["on"] = fmt::format("{} {}", options.split, options.seed);
+  const bool all = options.kind.empty() && !options.no_experiments &&
+                   columns.front().outcomes.size() ==
+                       truth::case_count(options.split == "final" ? truth::Split::final : truth::Split::development);
+  if (all) json["on"] = fmt::format("{} {}", options.split, options.seed);
   for (const bms::benchmark::Figure& f : bms::benchmark::figures_of(bms::benchmark::score(columns.front().outcomes))) {
     Json figure = {{"name", f.name}};
     if (f.share.of > 0)

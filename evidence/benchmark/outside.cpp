@@ -45,10 +45,12 @@ std::string json_of(const Options& options, const std::vector<Outcome>& outcomes
   const auto figure = [](const char* name, const bms::benchmark::Share& share) -> nlohmann::ordered_json {
     return {{"name", name}, {"hits", share.hits}, {"of", share.of}};
   };
-  const nlohmann::ordered_json json = {{"on", fmt::format("outside {} {}", options.split, options.seed)},
-                                       {"figures",
-                                        {figure("law of an unknown cause right", s.law),
-                                         figure("hold-out error above the floor halved by a learned term", s.cut)}}};
+  const char* const part = options.first > 0 || !options.only.empty() ? ", a part" : "";
+  const nlohmann::ordered_json json = {
+      {"on", fmt::format("outside {} {}, {} cases{}", options.split, options.seed, options.cases, part)},
+      {"figures",
+       {figure("law of an unknown cause right", s.law),
+        figure("hold-out error above the floor halved by a learned term", s.cut)}}};
   return json.dump(1) + "\n";
 }
 

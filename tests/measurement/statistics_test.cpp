@@ -42,6 +42,8 @@ TEST(NormalDistribution, HasTheValuesOfItsTables) {
   EXPECT_NEAR(normal_quantile(0.975), 1.959964, 1e-6);
   EXPECT_NEAR(normal_quantile(0.01), -2.326348, 1e-6);
   EXPECT_NEAR(normal_quantile(0.5), 0, 1e-9);
+  EXPECT_NEAR(normal_quantile(1e-9), -5.997807, 1e-6);
+  EXPECT_NEAR(normal_quantile(1 - 1e-9), 5.997807, 1e-6);
   EXPECT_NEAR(normal_tail(1.281552), 0.1, 1e-6);
   EXPECT_NEAR(normal_tail(-2), 0.977250, 1e-6);
 }
