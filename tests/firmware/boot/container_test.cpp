@@ -113,7 +113,10 @@ TEST(Refusals, HaveTheirNumbersAndWords) {
   EXPECT_EQ(static_cast<int>(Refusal::not_at_rest), 15);
   EXPECT_EQ(static_cast<int>(Refusal::erase_at_restart), 23);
   EXPECT_EQ(words_for(Refusal::trial_failed), "the image was started on trial and did not confirm itself");
-  EXPECT_EQ(words_for(static_cast<Refusal>(24)), "refused for a reason that this tool lacks");
+  EXPECT_EQ(static_cast<int>(Refusal::other_cell_file), 24);
+  EXPECT_EQ(static_cast<int>(Refusal::cell_out_of_range), 28);
+  EXPECT_EQ(words_for(Refusal::cell_out_of_range), "a cell constant is outside the range that a cell file may have");
+  EXPECT_EQ(words_for(static_cast<Refusal>(29)), "refused for a reason that this tool lacks");
 }
 
 }  // namespace
