@@ -93,6 +93,13 @@ TEST(Container, IsRefusedForWhatNoHeaderHas) {
   EXPECT_EQ(with(8, {0x01, 0x80, 0x03, 0}), Refusal::too_large);
 }
 
+TEST(Container, OfWhichNothingIsStatedIsZeroAfterItsKind) {
+  HeaderBytes written;
+  written.fill(0x55);
+  write_header(Header{}, {}, written);
+  EXPECT_EQ(std::count(written.begin() + 7, written.end(), 0), header_bytes - 7);
+}
+
 TEST(Container, NamesItsBlocks) {
   Header h;
   for (const auto& [bytes, blocks, last] :
