@@ -42,6 +42,10 @@ void start_updates(bms::storage::Persistence& persistence) {
     Board::update().start(persistence.events().starts, persistence.charge().operating_s);
     if (Board::update().returned())
       persistence.fault(bms::can::StoredFault::code_new_image_not_confirmed, bms::hal::calendar_s());
+    if (Board::update().cell_damaged()) {
+      persistence.fault(bms::can::Faults::first_cause_storage_fault, bms::hal::calendar_s());
+      Board::update().give_up_damaged_cell();
+    }
   }
 }
 

@@ -41,6 +41,10 @@ class UpdateService final : public boot::UpdateSurroundings {
   bool on_trial() const { return trial_ || cell_.trial; }
   /// This start has rejected a newer image, or newer cell constants, on trial.
   bool returned() const { return started_.returned || cell_.returned; }
+  /// The newest cell constants were complete once, and are damaged now: others act.
+  bool cell_damaged() const { return boot::says_damaged(cell_.refusal); }
+  /// Call when that is stored: their slot is erased at the next start, so it is said once.
+  void give_up_damaged_cell() { boot::give_up_damaged(cells_, cell_); }
 
   // UpdateSurroundings
   bool at_rest() override { return at_rest_; }

@@ -41,6 +41,13 @@ enum class Refusal : std::uint8_t {
   cell_out_of_range,
 };
 
+/// What a slot that was accepted is refused for only if its content has changed since. The other reasons also follow
+/// from another application, key or counter.
+constexpr bool says_damaged(Refusal refusal) {
+  return refusal == Refusal::not_a_header || refusal == Refusal::header_damaged || refusal == Refusal::bad_signature ||
+         refusal == Refusal::block_damaged;
+}
+
 /// For a person, in the order of Refusal.
 inline constexpr std::array<std::string_view, 29> refusal_words{
     "accepted",

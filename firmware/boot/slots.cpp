@@ -34,6 +34,10 @@ bool trial_failed(SlotFlash& flash, std::uint8_t slot, const Marks& marks, bool 
   return true;
 }
 
+std::uint8_t newest(const std::array<Marks, 2>& marks) {
+  return marks[1].complete && (!marks[0].complete || marks[1].sequence > marks[0].sequence) ? 1 : 0;
+}
+
 void settle(SlotFlash& flash, std::uint8_t slot, const Marks& marks, const Header& header) {
   set(flash, slot, complete_at, complete_mark);
   if (marks.confirmed) confirm(flash, slot, header.security_version);
@@ -73,8 +77,8 @@ Refusal check_slot(SlotFlash& flash, const Battery& battery, std::uint8_t slot, 
 Start choose(SlotFlash& flash, const Battery& battery, bool power_on, bool may_try) {
   Start start;
   const std::array<Marks, 2> marks{read_marks(flash, 0), read_marks(flash, 1)};
-  const bool b_first = marks[1].complete && (!marks[0].complete || marks[1].sequence > marks[0].sequence);
-  for (const std::uint8_t slot : {static_cast<std::uint8_t>(b_first), static_cast<std::uint8_t>(!b_first)}) {
+  const std::uint8_t first = newest(marks);
+  for (const std::uint8_t slot : {first, static_cast<std::uint8_t>(1 - first)}) {
     const Marks& m = marks[slot];
     if (!m.complete || (!may_try && !m.confirmed)) continue;
     Refusal refusal = m.usable() ? Refusal::none : Refusal::trial_failed;
@@ -117,6 +121,13 @@ bool prepare(SlotFlash& flash, std::uint8_t slot) {
 bool ask_for_erase(SlotFlash& flash, std::uint8_t slot) {
   return set(flash, slot, complete_at, 0) && set(flash, slot, erased_at, 0) &&
          set(flash, slot, erase_asked_at, erase_asked_mark);
+}
+
+bool give_up_damaged(SlotFlash& flash, const Start& started) {
+  const std::array<Marks, 2> marks{read_marks(flash, 0), read_marks(flash, 1)};
+  const std::uint8_t slot = newest(marks);
+  if (!marks[slot].complete || (started.found && started.slot == slot)) return false;
+  return ask_for_erase(flash, slot);
 }
 
 bool erase_if_asked(SlotFlash& flash, std::uint8_t slot) {

@@ -73,6 +73,9 @@ bool prepare(SlotFlash& flash, std::uint8_t slot);
 /// Asks the loader to erase a slot at the next start: what an image does that cannot erase while it protects. The slot
 /// is no longer usable.
 bool ask_for_erase(SlotFlash& flash, std::uint8_t slot);
+/// Asks for the erase of the newest complete slot if it is not the one that was started: its content was damaged since
+/// it was checked. So that is found once, and what was started stays. Returns true if it asked.
+bool give_up_damaged(SlotFlash& flash, const Start& started);
 /// Called by the loader for the slot that it does not start. Returns true if an erase was asked for; it was then tried.
 /// An interrupted erase has to be asked for again.
 bool erase_if_asked(SlotFlash& flash, std::uint8_t slot);

@@ -111,6 +111,9 @@ class MechanismValues<S, model::LawSet<S, Law...>> {
 /// S, Laws: scalar and laws of the application's model. Most: intervals that its tables have room for. 6 KB.
 template <class S, std::size_t Most, class Laws>
 class Contents {
+  static_assert(!std::same_as<S, model::FixedPoint>,
+                "fixed point holds fewer cells than a cell file may describe (model::fits_fixed_point)");
+
  public:
   using Values = MechanismValues<S, Laws>;
   using Tables = std::conditional_t<Values::mechanisms == 0, model::Cell<S, Most>, model::ExtendedCell<S, Most, Laws>>;

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Mutation test: puts small faults into firmware/protection/ and firmware/storage/, or into firmware/boot/, one at a
-time, and checks that the tests fail.
+"""Mutation test: puts small faults into firmware/protection/ and firmware/storage/, or into firmware/boot/ and
+firmware/cell_update/, one at a time, and checks that the tests fail.
 
     mutants.py BUILD_FOLDER [--part protection|boot] [--count 200] [--seed 1] [--jobs 2] [--report FILE]
       [--again REPORT]
@@ -43,7 +43,8 @@ shutil.copytree(checkout, root, ignore=shutil.ignore_patterns("build*", ".git", 
 
 
 def sources():
-    folders = ["firmware/boot"] if part == "boot" else ["firmware/protection", "firmware/storage"]
+    folders = {"boot": ["firmware/boot", "firmware/cell_update"],
+               "protection": ["firmware/protection", "firmware/storage"]}[part]
     return sorted(path.relative_to(root).as_posix() for folder in folders for path in (root / folder).iterdir()
                   if path.suffix in (".hpp", ".cpp"))
 
@@ -81,7 +82,8 @@ programs_of_boot = [
     ("tests/firmware/boot/crypto_test.cpp", "boot_test", ["firmware/boot/crypto_mbedtls.cpp"]),
     *((f"tests/firmware/boot/{name}_test.cpp", "boot_test", ["tests/firmware/storage/flash_model.cpp", *boot])
       for name in ("container", "iso_tp", "slots", "receiver", "memory_of_the_chip", "update_services", "update_server",
-                   "update_power_cut")),
+                   "cell_slots", "cell_server", "update_power_cut")),
+    ("tests/firmware/cell_update/contents_test.cpp", "cell_update_test", []),
 ]
 part_option = argparse.ArgumentParser(add_help=False)
 part_option.add_argument("--part", choices=("protection", "boot"), default="protection")
@@ -95,7 +97,7 @@ first = {
     "log_line": "log_test", "verify": "receiver_test", "refusal": "container_test",
     "slot_flash": "slots_test", "crypto_mbedtls": "crypto_test", "handover": "memory_of_the_chip_test",
     "key_table": "memory_of_the_chip_test", "flash_map": "memory_of_the_chip_test",
-    "update_server": "update_services_test",
+    "update_server": "update_services_test", "format": "contents_test",
 }
 checks = ["-O1", "-g0", "-w", "-D_GLIBCXX_ASSERTIONS", "-DBMS_POWER_CUT_SEQUENCES=60", "-DBMS_UPDATE_POWER_CUTS=300"]
 compiler = "clang++"  # twice as fast as g++
@@ -282,8 +284,9 @@ class Build:
         for test, target, further in programs:
             out = self.build_program(test, target, further, self.objects, scratch / "unchanged")
             begin = time.monotonic()
-            if self.run(out, 600) != "survived":
-                sys.exit(f"mutants: {test} fails without a change")
+            result = self.run(out, 600)
+            if result != "survived":
+                sys.exit(f"mutants: {test} fails without a change: {result}")
             self.usual_s[test] = time.monotonic() - begin
 
     def sources_of(self, compiled):

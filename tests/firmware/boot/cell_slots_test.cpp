@@ -4,7 +4,9 @@
 namespace bms::boot {
 namespace {
 
-#if defined(__SANITIZE_ADDRESS__)
+#if defined(BMS_UPDATE_POWER_CUTS)
+constexpr int wanted_cuts = BMS_UPDATE_POWER_CUTS / 4;  // tests/mutants
+#elif defined(__SANITIZE_ADDRESS__)
 constexpr int wanted_cuts = 150;
 #else
 constexpr int wanted_cuts = 500;  // UpdatePowerCuts has 2,000 of the same code
@@ -129,13 +131,47 @@ TEST(CellSlots, EachRefusalHasItsReasonAndChangesNothing) {
   EXPECT_EQ(bench.transfer(cell({.slot = 0}), 2), Refusal::other_kind) << "and not in the slot of an application";
 }
 
-TEST(CellSlots, ThatAreDamagedLaterDoNotAct) {
+TEST(CellSlots, ThatAreDamagedLaterDoNotActAndAreGivenUpOnce) {
   CellBench bench;
   bench.install();
+  EXPECT_FALSE(give_up_damaged(bench.cells(), bench.reset_cell(true))) << "they act";
   bench.cell_flash().flip(0, header_bytes + 500, 0x10);
   const Start start = bench.reset_cell(true);
   EXPECT_FALSE(start.found);
   EXPECT_EQ(start.refusal, Refusal::block_damaged);
+  EXPECT_TRUE(says_damaged(start.refusal));
+  ASSERT_TRUE(give_up_damaged(bench.cells(), start));
+  const Start next = bench.reset_cell(true);
+  EXPECT_FALSE(next.found);
+  EXPECT_EQ(next.refusal, Refusal::none);
+  EXPECT_TRUE(read_marks(bench.cells(), 0).erased);
+  EXPECT_FALSE(give_up_damaged(bench.cells(), next)) << "nothing is complete";
+}
+
+TEST(CellSlots, TheOlderOnesActInPlaceOfDamagedOnesAndStay) {
+  for (const bool in_header : {false, true}) {
+    CellBench bench;
+    bench.install({.cell_hash = 0xAAAA});
+    ASSERT_EQ(bench.transfer_cell(cell({.slot = 1, .cell_hash = 0xBBBB, .seed = 2}), 0), Refusal::none);
+    ASSERT_TRUE(bench.reset_cell(true).trial);
+    ASSERT_TRUE(confirm(bench.cells(), 1, 1));
+    bench.cell_flash().flip(1, in_header ? 12 : header_bytes + 1, 1);  // 12: the version
+    const Start start = bench.reset_cell(true);
+    EXPECT_EQ(start.header.cell_hash, 0xAAAAU);
+    EXPECT_EQ(start.refusal, in_header ? Refusal::bad_signature : Refusal::block_damaged);
+    EXPECT_TRUE(says_damaged(start.refusal));
+    EXPECT_TRUE(give_up_damaged(bench.cells(), start));
+    const Start next = bench.reset_cell(true);
+    EXPECT_TRUE(next.found && !next.trial && next.slot == 0);
+    EXPECT_EQ(next.refusal, Refusal::none);
+    EXPECT_FALSE(give_up_damaged(bench.cells(), next));
+  }
+}
+
+TEST(CellSlots, WhatAnotherApplicationKeyOrCounterForbidsIsNotDamaged) {
+  for (const Refusal r : {Refusal::none, Refusal::other_cell_file, Refusal::unknown_key, Refusal::revoked_key,
+                          Refusal::older_security, Refusal::development_image, Refusal::trial_failed})
+    EXPECT_FALSE(says_damaged(r)) << words_for(r);
 }
 
 // ---- losses of power ----

@@ -8,8 +8,9 @@
 #include "replay/replay.hpp"
 #include "storage/persistence.hpp"
 #include "tests/firmware/boot/board_bus.hpp"
+#include "tests/firmware/boot/recorded_flash.hpp"
+#include "tests/firmware/boot/signed_cell.hpp"
 #include "tests/firmware/storage/flash_model.hpp"
-#include "update/cell_payload.hpp"
 #include "update/update_run.hpp"
 
 namespace bms::boot {
@@ -19,26 +20,6 @@ using ::testing::IsEmpty;
 using Outcome = update::UpdateResult::Outcome;
 
 constexpr std::uint16_t cell_file_key = 2;  // firmware/stored_state.hpp
-constexpr std::uint32_t by_power = 1U << 27 | 1U << 26 | 1U << 25;
-
-files::CellFile better() {
-  files::CellFile cell = files::read_cell("table9");
-  for (std::size_t k = 0; k < cell.parameters.rc.r0_ohm.size; ++k) cell.parameters.rc.r0_ohm[k] *= 1.2;
-  for (std::size_t k = 0; k < cell.parameters.rc.c1_f.size; ++k) cell.parameters.rc.c1_f[k] *= 0.9;
-  cell.parameters.tolerance.resistance_fraction = 0.04;
-  return files::parse_cell(files::cell_text(cell), "better.toml");
-}
-
-std::vector<update::Container> signed_cell(const files::CellFile& cell, std::uint32_t security_version = 1) {
-  auto payloads = update::cell_payloads(cell, files::read_cell("table9"));
-  for (update::Payload& p : payloads) {
-    std::ranges::copy(std::string("stm32f405_forklift"), p.header.board.begin());
-    p.header.version = 0x010000;
-    p.header.security_version = security_version;
-    p.header.oldest_loader = 0x000200;
-  }
-  return sign(std::move(payloads), key_of("product"));
-}
 
 /// A truck at rest whose load and cells change; what it measured, and what its battery estimated since its last start.
 class MeasuredBattery {

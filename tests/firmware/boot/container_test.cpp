@@ -93,6 +93,13 @@ TEST(Container, IsRefusedForWhatNoHeaderHas) {
   EXPECT_EQ(with(8, {0x01, 0x80, 0x03, 0}), Refusal::too_large);
 }
 
+TEST(Container, OfWhichNothingIsStatedIsZeroAfterItsKind) {
+  HeaderBytes written;
+  written.fill(0x55);
+  write_header(Header{}, {}, written);
+  EXPECT_EQ(std::count(written.begin() + 7, written.end(), 0), header_bytes - 7);
+}
+
 TEST(Container, NamesItsBlocks) {
   Header h;
   for (const auto& [bytes, blocks, last] :
@@ -113,7 +120,10 @@ TEST(Refusals, HaveTheirNumbersAndWords) {
   EXPECT_EQ(static_cast<int>(Refusal::not_at_rest), 15);
   EXPECT_EQ(static_cast<int>(Refusal::erase_at_restart), 23);
   EXPECT_EQ(words_for(Refusal::trial_failed), "the image was started on trial and did not confirm itself");
-  EXPECT_EQ(words_for(static_cast<Refusal>(refusal_words.size())), "refused for a reason that this tool lacks");
+  EXPECT_EQ(static_cast<int>(Refusal::other_cell_file), 24);
+  EXPECT_EQ(static_cast<int>(Refusal::cell_out_of_range), 28);
+  EXPECT_EQ(words_for(Refusal::cell_out_of_range), "a cell constant is outside the range that a cell file may have");
+  EXPECT_EQ(words_for(static_cast<Refusal>(29)), "refused for a reason that this tool lacks");
 }
 
 }  // namespace

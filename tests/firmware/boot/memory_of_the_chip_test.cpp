@@ -81,6 +81,33 @@ TEST(HandoverToTheImage, OfADevelopmentImageOrAProductIsNotMixedUp) {
   EXPECT_EQ(h.development, 0);
 }
 
+/// A loader stays for the life of a battery. The numbers were computed apart from its code.
+TEST(HandoverToTheImage, HasTheCheckThatEveryLoaderWrites) {
+  const Handover h{.magic = 0x424F'4F54,
+                   .loader_version = 0x0002'0100,
+                   .security_counter = 7,
+                   .slot = 1,
+                   .trial = 1,
+                   .returned = 1,
+                   .refusal = 19,
+                   .product = 1,
+                   .development = 1,
+                   .version = 0x0003'0201,
+                   .cell_hash = 0x89AB'CDEF,
+                   .security_version = 9};
+  EXPECT_EQ(check_of(h), 0x2737'576AU);
+  const CellHandover cell{.magic = 0x4345'4C4C,
+                          .slot = 1,
+                          .trial = 1,
+                          .returned = 1,
+                          .refusal = 19,
+                          .version = 0x0003'0201,
+                          .cell_hash = 0x89AB'CDEF,
+                          .security_version = 9,
+                          .security_counter = 7};
+  EXPECT_EQ(check_of(cell), 0x261F'7572U);
+}
+
 TEST(HandoverToTheImage, WithAnyWrongBitIsNone) {
   const Handover right = handover_of(some_start(), some_battery());
   for (std::size_t bit = 0; bit < 8 * sizeof right; ++bit) {

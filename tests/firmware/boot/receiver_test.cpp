@@ -170,5 +170,18 @@ TEST_F(ReceiverTest, RefusesEachFlippedBitOfHeaderAndBlocks) {
   }
 }
 
+TEST(Battery, WithoutAStatedLoaderOrCounterAcceptsWhatNeedsNone) {
+  Bench bench;
+  Battery battery = bench.battery();
+  battery.loader_version = Battery{}.loader_version;
+  battery.security_counter = Battery{}.security_counter;
+  Header header;
+  const auto check = [&](const ImageWish& w) {
+    return check_header(bytes_of(image(w)).first<header_bytes>(), battery, 1, header);
+  };
+  EXPECT_EQ(check({.slot = 1, .security_version = 0}), Refusal::none);
+  EXPECT_EQ(check({.slot = 1, .security_version = 0, .oldest_loader = 1}), Refusal::newer_loader_needed);
+}
+
 }  // namespace
 }  // namespace bms::boot

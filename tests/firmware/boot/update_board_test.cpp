@@ -7,62 +7,16 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include <cstdlib>
-
 #include "can/generated/can_messages.hpp"
 #include "tests/firmware/boot/board_bus.hpp"
+#include "tests/firmware/boot/recorded_flash.hpp"
 #include "tests/firmware/boot/stored_years.hpp"
 #include "update/update_run.hpp"
 
 namespace bms::boot {
 namespace {
 
-using Operation = firmware::FlashControllerModel::Operation;
 using ::testing::IsEmpty;
-
-/// Block 1 of the one-time programmable memory; block 0 has the device key.
-constexpr std::uint32_t one_time_begin = 0x1FFF'7820, one_time_bytes = 32, by_power = 1U << 27 | 1U << 26 | 1U << 25;
-
-/// All flash of the chip but the loader's.
-struct Contents {
-  std::vector<std::uint8_t> stored = std::vector<std::uint8_t>(Stored::sectors * Stored::sector_bytes, 0xFF);
-  std::vector<std::uint8_t> slots = std::vector<std::uint8_t>(2 * application_slot_bytes, 0xFF);
-  std::vector<std::uint8_t> one_time = std::vector<std::uint8_t>(one_time_bytes, 0xFF);
-
-  std::span<std::uint8_t> place(const Operation& o) {
-    if (o.address >= one_time_begin) return part_of(one_time, o.address - one_time_begin, o.bytes);
-    if (o.address >= application_slots[0]) return part_of(slots, o.address - application_slots[0], o.bytes);
-    return part_of(stored, o.address - Stored::memory, o.bytes);
-  }
-  static std::span<std::uint8_t> part_of(std::vector<std::uint8_t>& of, std::size_t at, std::size_t bytes) {
-    if (at + bytes > of.size()) throw std::out_of_range("an operation outside of the flash that this test knows");
-    return std::span(of).subspan(at, bytes);
-  }
-  void apply(const Operation& o) {
-    const auto bytes = place(o);
-    for (std::size_t k = 0; k < bytes.size(); ++k)
-      bytes[k] = o.bytes > 4 ? 0xFF : bytes[k] & static_cast<std::uint8_t>(o.value >> 8 * k);
-  }
-  /// The operation in which the power failed: of its bits any may have changed already.
-  void tear(const Operation& o, std::mt19937& random) {
-    const auto bytes = place(o);
-    for (std::size_t k = 0; k < bytes.size(); ++k) {
-      const auto any = static_cast<std::uint8_t>(random());
-      bytes[k] = o.bytes > 4 ? any : bytes[k] & (any | static_cast<std::uint8_t>(o.value >> 8 * k));
-    }
-  }
-  std::span<const std::uint8_t> slot(std::uint8_t which) const {
-    return std::span(slots).subspan(which * application_slot_bytes, application_slot_bytes);
-  }
-};
-
-Contents contents_of(firmware::UnicornBoard& board) {
-  Contents c;
-  c.stored = board.flash.bytes;
-  c.slots = board.read_flash(application_slots[0], 2 * application_slot_bytes);
-  c.one_time = board.read_flash(one_time_begin, one_time_bytes);
-  return c;
-}
 
 // ---- one update without a disturbance ----
 
@@ -85,7 +39,7 @@ std::size_t operations_until_confirmed(const Update& u) {
     const Operation& o = u.operations[k];
     c.apply(o);
     if (o.bytes != 4 || o.address >= end || o.address < end - trailer_bytes) continue;
-    std::ranges::copy(c.slot(1), slots.slots[1].begin());
+    std::ranges::copy(c.slot(Kind::application, 1), slots.slots[1].begin());
     if (read_marks(slots, 1).confirmed) return k + 1;
   }
   return 0;
@@ -192,84 +146,47 @@ class Cuts {
   static constexpr unsigned works_on_every = 21;  // coprime to the number of parts, so that each part has its turn
 
  public:
-  Cuts() : battery_(1, the_update().images[0].bytes), bus_(battery_.board) {
-    battery_.board.longest_sleep_us = 500;
-    for (std::size_t k = 0; k < the_update().operations.size(); ++k)
-      parts_[part_of(the_update().operations[k])].push_back(k);
-  }
+  Cuts() : battery_(1, the_update().images[0].bytes), bus_(battery_.board) { battery_.board.longest_sleep_us = 500; }
 
   void one(unsigned number) {
-    std::mt19937 random(number);
-    const auto part = std::next(parts_.begin(), static_cast<long>(number % parts_.size()));
-    const std::size_t k = part->second[random() % part->second.size()];
-    when_ = fmt::format("cut {} in operation {}: {}", number, k, part->first);
-    ++by_part_[part->first];
-    Contents c = the_update().before;
-    for (std::size_t i = 0; i < k; ++i) c.apply(the_update().operations[i]);
-    charges_.before = charge_in(c.stored);
-    Contents after = c;
-    for (std::size_t i = k; i < the_update().operations.size() && part_of(the_update().operations[i]) == "stored data";)
-      after.apply(the_update().operations[i++]);
-    charges_.after = charge_in(after.stored);
-    c.tear(the_update().operations[k], random);
-    start(c, random() % 2 == 0 ? static_cast<int>(random() % 4) : -1);
-    const std::uint8_t runs = check_image(k);
+    const Cut cut = plan_.cut(number);
+    in_starts_ += start_after(cut, battery_);
+    const std::uint8_t runs = check_image(cut);
     if (number % works_on_every != 0 || ::testing::Test::HasFailure()) return;
     // The image works on: it opens the stored data and sends.
     bus_.pass(1'500);
-    EXPECT_EQ(battery_.running(), runs) << when_;
+    EXPECT_EQ(battery_.running(), runs) << cut.name;
     EXPECT_TRUE(std::ranges::any_of(battery_.board.can.seen, [](const auto& f) {
       return f.from_board && f.frame.id == can::PackState::id;
-    })) << when_;
-    expect_nothing_lost(battery_.board.flash.bytes, charges_, when_);
+    })) << cut.name;
+    expect_nothing_lost(battery_.board.flash.bytes, cut.charges, cut.name);
   }
-  const std::map<std::string, unsigned>& by_part() const { return by_part_; }
+  const std::map<std::string, unsigned>& by_part() const { return plan_.by_part(); }
   unsigned in_starts() const { return in_starts_; }
 
  private:
-  void start(const Contents& c, int operations_to_the_next_cut) {
-    firmware::UnicornBoard& board = battery_.board;
-    board.can.seen.clear();
-    board.flash.bytes = c.stored;
-    board.write_flash(application_slots[0], c.slots);
-    board.write_flash(one_time_begin, c.one_time);
-    board.flash.operations_to_power_loss = operations_to_the_next_cut;
-    const std::size_t before = board.resets.size();
-    board.reset(by_power);
-    ASSERT_TRUE(board.run_until([&] { return battery_.running() != 2; }, 6'000)) << when_ << ": no image runs";
-    in_starts_ += static_cast<unsigned>(board.resets.size() - before - 1);
-    board.flash.operations_to_power_loss = -1;
-  }
   /// What runs is what was signed, complete; after the new image has confirmed itself, it is that one.
-  std::uint8_t check_image(std::size_t k) {
+  std::uint8_t check_image(const Cut& cut) {
     const std::uint8_t runs = battery_.running();
     if (runs > 1) return runs;
     const std::string& signed_bytes = the_update().images[runs].bytes;
     EXPECT_TRUE(std::ranges::equal(battery_.board.read_flash(application_slots[runs], signed_bytes.size()),
                                    bytes_of(signed_bytes)))
-        << when_;
-    const bool confirmed = k >= the_update().confirmed_at;
-    EXPECT_TRUE(runs == 1 || !confirmed) << when_ << ": older than what was confirmed";
-    expect_nothing_lost(battery_.board.flash.bytes, charges_, when_);
+        << cut.name;
+    const bool confirmed = cut.operation >= the_update().confirmed_at;
+    EXPECT_TRUE(runs == 1 || !confirmed) << cut.name << ": older than what was confirmed";
+    expect_nothing_lost(battery_.board.flash.bytes, cut.charges, cut.name);
     // Both images have the security version 1, and the first one has confirmed itself before the update.
     EXPECT_EQ(battery_.board.read_flash(one_time_begin, 4), (std::vector<std::uint8_t>{0xFE, 0xFF, 0xFF, 0xFF}))
-        << when_;
+        << cut.name;
     return runs;
   }
 
   LoaderBoard battery_;
   BoardBus bus_;
-  std::map<std::string, std::vector<std::size_t>> parts_;
-  std::map<std::string, unsigned> by_part_;
+  CutPlan plan_{the_update().before, the_update().operations, part_of};
   unsigned in_starts_ = 0;
-  Charges charges_;
-  std::string when_;
 };
-
-int of_environment(const char* name, int otherwise) {
-  const char* value = std::getenv(name);
-  return value != nullptr ? std::atoi(value) : otherwise;
-}
 
 TEST(UpdateOfTheBoard, AfterEveryLossOfPowerOneOfTheImagesRunsAndNoRecordIsLost) {
   const int cuts = of_environment("BMS_UPDATE_CUTS", 40), first = of_environment("BMS_UPDATE_FIRST_CUT", 0);
