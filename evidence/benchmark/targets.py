@@ -29,7 +29,8 @@ TABLES = ((HERE / "README.md", "targets", ""),  # file, its mark, what the names
 COUNTS = (
     (REAL + "false alarms on healthy recordings", ("nulls", "false"), ("nulls", "cases")),
     (REAL + "faults put in, twice the stated limit and above: detected", ("faults", "detected"), ("faults", "cases")),
-    (REAL + "faults put in, twice the stated limit and above: right first", ("faults", "first_right"), ("faults", "cases")),
+    (REAL + "faults put in, twice the stated limit and above: right first", ("faults", "first_right"),
+     ("faults", "cases")),
     (REAL + "faults put in: size within two sigma", ("faults", "size_within_2_sigma"), ("faults", "size_compared")),
     (REAL + "faults that nobody put in: right, recording alone", ("natural", "alone", "right"),
      ("natural", "alone", "cases")),
