@@ -81,12 +81,11 @@ def keep(o):
         fail(f"{o.result}:1: does not say on which cases, expected --on")
     if git("status", "--porcelain", "--untracked-files=no", "--", ":/", f":(exclude,top){MEASURED.relative_to(ROOT)}"):
         fail("not everything is committed: the commit would not be that of the figures")
-    known = {t["name"] for t in targets()}
-    kept = [m for m in measured() if (m["name"], m["on"]) not in {(f["name"], on) for f in figures_of(result)}]
-    kept += [{**f, "on": on, "commit": git("rev-parse", "--short=8", "HEAD"),
-              "date": datetime.date.today().isoformat(), "command": o.command}
-             for f in figures_of(result) if f["name"] in known]
     order = [t["name"] for t in targets()]
+    new = {f["name"]: f for f in figures_of(result) if f["name"] in order}
+    source = {"on": on, "commit": git("rev-parse", "--short=8", "HEAD"), "date": datetime.date.today().isoformat(),
+              "command": o.command}
+    kept = [m for m in measured() if m["on"] != on or m["name"] not in new] + [{**f, **source} for f in new.values()]
     kept.sort(key=lambda m: (order.index(m["name"]), m["on"]))
     MEASURED.write_text("[\n" + ",\n".join(json.dumps(m) for m in kept) + "\n]\n", encoding="utf-8")
 

@@ -28,18 +28,15 @@ class Writer {
   bool optional_table(const char*, bool) { return true; }
   void number(const char*, double value) { number(value); }
   void optional_number(const char*, double value, double = 0) { number(value); }
-  void optional_flag(const char*, bool value) { put(static_cast<std::uint32_t>(value), 1); }
+  void optional_flag(const char*, bool value) { put(static_cast<std::uint8_t>(value)); }
   template <class Column>
   void column(const char*, const Column& column) {
-    put(static_cast<std::uint32_t>(column.size), 1);
+    put(static_cast<std::uint8_t>(column.size));
     for (std::size_t k = 0; k < column.size; ++k) number(column[k]);
   }
   template <class Column>
   void optional_column(const char* key, const Column& values) {
     column(key, values);
-  }
-  void put(std::uint32_t value, std::size_t size) {
-    for (std::size_t k = 0; k < size; ++k) bytes_ += static_cast<char>(value >> (8 * k) & 0xFF);
   }
   const std::string& bytes() const { return bytes_; }
 
@@ -119,13 +116,13 @@ std::vector<Payload> cell_payloads(const files::CellFile& cell, const files::Cel
   Writer w;
   w.put(cell_update::magic);
   w.put(cell_update::format);
-  w.put(static_cast<std::uint32_t>(mechanisms.size()), 2);
+  w.put(static_cast<std::uint16_t>(mechanisms.size()));
   const auto parameters = without_deviations(cell.parameters);
   model::visit_cell(w, parameters);
   for (const model::MechanismSetting& m : mechanisms) {
     const model::MechanismInfo& info = model::catalogue[m.index];
     w.put(cell_update::id_hash(info.id));
-    w.put(static_cast<std::uint32_t>(info.parameters), 1);
+    w.put(static_cast<std::uint8_t>(info.parameters));
     for (std::size_t k = 0; k < info.parameters; ++k) w.number(m.value[k]);
   }
   if (w.bytes().size() > boot::block_bytes)
