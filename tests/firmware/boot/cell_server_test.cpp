@@ -45,13 +45,7 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
   std::size_t read(std::span<monitor::BusFrame> room, int) override {
     std::size_t n = 0;
     can::Frame frame;
-    while (n < room.size() && node_->next_frame(frame, now_us())) {
-      room[n].kind = monitor::FrameKind::standard;
-      room[n].id = frame.id;
-      room[n].length = frame.length;
-      std::ranges::copy(frame.data, room[n].data.begin());
-      ++n;
-    }
+    while (n < room.size() && node_->next_frame(frame, now_us())) room[n++] = monitor::to_bus_frame(frame, 0);
     return n;
   }
   bool ended() const override { return false; }

@@ -39,11 +39,7 @@ class VirtualBattery final : public monitor::FrameSource, public UpdateSurroundi
       const bool about_its_state = frame.data[0] == 0x10 && frame.data[2] == 0x62 && frame.data[4] == 0xA1;
       if (about_its_state && complete_ && states_lost > 0 && states_lost-- > 0) continue;
       if (about_its_state && !states_its_time) frame.data[1] = 27;
-      room[n].kind = monitor::FrameKind::standard;
-      room[n].id = frame.id;
-      room[n].length = frame.length;
-      std::ranges::copy(frame.data, room[n].data.begin());
-      ++n;
+      room[n++] = monitor::to_bus_frame(frame, 0);
     }
     return n;
   }
