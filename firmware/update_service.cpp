@@ -77,7 +77,7 @@ void UpdateService::use_cell() {
     refusal = use_cell_constants(bytes, h.cell_hash);
   }
   if (refusal == boot::Refusal::none) return;
-  cell_.found = cell_.trial = false;
+  cell_.found = false;
   server_->cell_refused(refusal);
 }
 
@@ -103,6 +103,8 @@ bool UpdateService::restart_due(const Health& health) {
     restart_wanted_ = false;
     return at_rest_;
   }
+  // Constants on trial that cannot be used have failed: after the restart those act that were confirmed before.
+  if (cell_.trial && !cell_.found) return true;
   if (on_trial()) judge_trial(health);
   if (on_trial() && health.now_us - first_us_ > longest_trial_us) return true;
   send_waiting(hal::now_us());

@@ -57,7 +57,6 @@ inline std::optional<Start> start_of(const Handover& h) {
   s.trial = h.trial != 0;
   s.returned = h.returned != 0;
   s.refusal = static_cast<Refusal>(h.refusal);
-  s.header.slot = h.slot;
   s.header.version = h.version;
   s.header.cell_hash = h.cell_hash;
   s.header.security_version = h.security_version;
@@ -111,7 +110,6 @@ inline std::optional<Start> start_of(const CellHandover& h) {
   s.returned = h.returned != 0;
   s.refusal = static_cast<Refusal>(h.refusal);
   s.header.kind = Kind::cell;
-  s.header.slot = s.slot;
   s.header.version = h.version;
   s.header.cell_hash = h.cell_hash;
   s.header.security_version = h.security_version;

@@ -91,9 +91,10 @@ class UpdateServer {
     started_.trial = false;
     if (cells_) cells_->started.trial = false;
   }
-  /// The application cannot use the cell constants that the loader has started: those of its build act.
+  /// The application cannot use the cell constants that the loader has started: those of its build act. A trial goes on
+  /// until the restart that ends it.
   void cell_refused(Refusal why) {
-    cells_->started.found = cells_->started.trial = false;
+    cells_->started.found = false;
     cells_->started.refusal = why;
   }
   /// Of a block, for anyone while no transfer is active.

@@ -222,5 +222,60 @@ TEST(CellUpdateOfTheBoard, ConfirmedConstantsThatAreDamagedLaterFallBackWithOneS
   EXPECT_TRUE(battery.board.flash.violations.empty());
 }
 
+/// Sets the marks of a slot of cell constants in contents.
+class PlantedCells final : public SlotFlash {
+ public:
+  explicit PlantedCells(Contents& contents) : contents_(contents) {}
+  std::uint32_t slot_bytes() const override { return cell_slot_bytes; }
+  bool erase(std::uint8_t slot) override {
+    std::ranges::fill(place(slot), std::uint8_t{0xFF});
+    return true;
+  }
+  bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
+    for (std::size_t k = 0; k < 4; ++k) place(slot)[at + k] &= static_cast<std::uint8_t>(word >> 8 * k);
+    return true;
+  }
+  void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override {
+    std::ranges::copy(place(slot).subspan(at, into.size()), into.begin());
+  }
+  std::uint32_t one_time(std::uint32_t) override { return ~0U; }
+  bool program_one_time(std::uint32_t, std::uint32_t) override { return false; }
+  std::span<std::uint8_t> place(std::uint8_t slot) {
+    return std::span(contents_.slots).subspan(cell_slots[slot] - application_slots[0], cell_slot_bytes);
+  }
+
+ private:
+  Contents& contents_;
+};
+
+TEST(CellUpdateOfTheBoard, ConstantsOnTrialThatCannotBeUsedGiveWayToTheConfirmedOnes) {
+  const Updates& u = the_updates();
+  Cut planted;
+  planted.contents = u.before;
+  for (std::size_t k = 0; k < u.sent[1].complete_at; ++k) planted.contents.apply(u.operations[k]);
+  PlantedCells cells(planted.contents);
+  ASSERT_TRUE(read_marks(cells, 0).confirmed && !read_marks(cells, 1).complete);
+  auto payloads = update::cell_payloads(better(1.2), files::read_cell("table9"));
+  for (update::Payload& p : payloads) p.bytes.at(8 + 3 * 8) ^= 1;  // the last bit of limits.voltage_max_v
+  const std::string refused = signed_payloads(std::move(payloads), 2).at(1).bytes;
+  ASSERT_TRUE(prepare(cells, 1));
+  std::ranges::copy(bytes_of(refused), cells.place(1).begin());
+  ASSERT_TRUE(complete(cells, 1));
+
+  LoaderBoard battery;
+  BoardBus bus(battery.board);
+  start_after(planted, battery);
+  const std::size_t resets = battery.board.resets.size();
+  bus.pass(3'000);
+  EXPECT_EQ(battery.board.resets.size(), resets + 1) << "one restart, asked for by the application";
+  const auto state = state_of(bus);
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->acting_hash, u.sent[0].hash);
+  EXPECT_TRUE(state->returned);
+  planted.contents = contents_of(battery.board);
+  EXPECT_TRUE(read_marks(cells, 1).rejected);
+  EXPECT_TRUE(battery.board.flash.violations.empty());
+}
+
 }  // namespace
 }  // namespace bms::boot

@@ -18,8 +18,9 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
   }
 
   bool rest = true, healthy = true, usable = true, knows_cells = true, application_on_trial = false;
-  bool confirms = true;       ///< constants on trial at once
-  bool answers_late = false;  ///< after a restart: no sooner than its last start was ago
+  bool confirms = true;         ///< constants on trial at once
+  int restarts_when_asked = 0;  ///< constants on trial that cannot be used: at which request the battery restarts
+  bool answers_late = false;    ///< after a restart: no sooner than its last start was ago
   CellBench bench;
   Start cell;
   std::vector<std::uint8_t> kinds_erased;
@@ -51,6 +52,7 @@ class BatteryWithCells final : public monitor::FrameSource, public UpdateSurroun
   bool ended() const override { return false; }
   bool live() const override { return true; }
   bool send(const can::Frame& frame) override {
+    if (cell.trial && !usable && restarts_when_asked > 0 && --restarts_when_asked == 0) start(false);
     node_->receive(frame, now_us());
     return true;
   }
@@ -128,10 +130,25 @@ TEST_F(CellServerTest, ThoseThatAreNotConfirmedReturn) {
 }
 
 TEST_F(CellServerTest, ThoseThatTheApplicationCannotUseAreReportedWithItsReason) {
+  ASSERT_EQ(run(wish()).outcome, Outcome::done);
+  battery_.usable = false;  // as after a new image with another model
+  battery_.start(true);
+  update::Link link(battery_);
+  const auto state = update::read_cell_state(link);
+  ASSERT_TRUE(state);
+  EXPECT_EQ(state->refusal, Refusal::other_model);
+  EXPECT_EQ(state->acting_hash, hash_of_build);
+  EXPECT_FALSE(state->trial);
+}
+
+TEST_F(CellServerTest, ThoseThatTheApplicationCannotUseStayOnTrialUntilItsRestart) {
   battery_.usable = false;
+  battery_.restarts_when_asked = 8;
   const auto result = run(wish());
   EXPECT_EQ(result.outcome, Outcome::returned);
-  EXPECT_NE(result.reason.find(words_for(Refusal::other_model)), std::string::npos) << result.reason;
+  EXPECT_EQ(battery_.restarts_when_asked, 0) << "the tool has waited for the restart that ends the trial";
+  EXPECT_NE(result.reason.find("; those of the firmware act again"), std::string::npos) << result.reason;
+  EXPECT_TRUE(read_marks(battery_.bench.cells(), 0).rejected);
 }
 
 TEST_F(CellServerTest, EachRefusalArrivesInWords) {

@@ -162,12 +162,8 @@ TEST(CellUpdateOfTheBoard, OtherLimitsAreRefusedByTheBatteryWhoeverSignedThem) {
   MeasuredBattery truck;
   truck.bus.pass(1'500);
   auto payloads = update::cell_payloads(better(), files::read_cell("table9"));
-  for (update::Payload& p : payloads) {
-    std::ranges::copy(std::string("stm32f405_forklift"), p.header.board.begin());
-    p.header.security_version = 1;
-    p.bytes.at(8 + 3 * 8) ^= 1;  // the last bit of limits.voltage_max_v
-  }
-  const auto result = truck.send(sign(std::move(payloads), key_of("product")));
+  for (update::Payload& p : payloads) p.bytes.at(8 + 3 * 8) ^= 1;  // the last bit of limits.voltage_max_v
+  const auto result = truck.send(signed_payloads(std::move(payloads)));
   EXPECT_EQ(result.outcome, Outcome::refused);
   EXPECT_EQ(result.reason, words_for(Refusal::other_limits));
   truck.start_from_voltage(2'000);

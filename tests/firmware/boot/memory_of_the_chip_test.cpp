@@ -28,7 +28,6 @@ Start some_start() {
   s.trial = true;
   s.returned = true;
   s.refusal = Refusal::bad_signature;
-  s.header.slot = 1;
   s.header.version = 0x030201;
   s.header.cell_hash = 0xCAFE'F00D;
   s.header.security_version = 17;
@@ -54,13 +53,12 @@ TEST(HandoverToTheImage, HasEveryFieldOfTheStart) {
   EXPECT_TRUE(s->found && s->trial && s->returned && s->header.development());
   EXPECT_EQ(s->slot, 1);
   EXPECT_EQ(s->refusal, Refusal::bad_signature);
-  EXPECT_EQ(s->header.slot, 1);
   EXPECT_EQ(s->header.version, 0x030201U);
   EXPECT_EQ(s->header.cell_hash, 0xCAFE'F00DU);
   EXPECT_EQ(s->header.security_version, 17U);
 
   Start other = some_start();
-  other.slot = other.header.slot = 0;
+  other.slot = 0;
   other.trial = other.returned = false;
   other.refusal = Refusal::none;
   other.header.flags = 0;

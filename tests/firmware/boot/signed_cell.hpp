@@ -19,9 +19,8 @@ inline files::CellFile better(double r0_factor = 1.2) {
   return files::parse_cell(files::cell_text(cell), "better.toml");
 }
 
-/// For both slots.
-inline std::vector<update::Container> signed_cell(const files::CellFile& cell, std::uint32_t security_version = 1) {
-  auto payloads = update::cell_payloads(cell, files::read_cell("table9"));
+inline std::vector<update::Container> signed_payloads(std::vector<update::Payload> payloads,
+                                                      std::uint32_t security_version = 1) {
   for (update::Payload& p : payloads) {
     std::ranges::copy(std::string("stm32f405_forklift"), p.header.board.begin());
     p.header.version = 0x010000;
@@ -29,6 +28,10 @@ inline std::vector<update::Container> signed_cell(const files::CellFile& cell, s
     p.header.oldest_loader = 0x000200;
   }
   return sign(std::move(payloads), key_of("product"));
+}
+/// For both slots.
+inline std::vector<update::Container> signed_cell(const files::CellFile& cell, std::uint32_t security_version = 1) {
+  return signed_payloads(update::cell_payloads(cell, files::read_cell("table9")), security_version);
 }
 
 }  // namespace bms::boot
