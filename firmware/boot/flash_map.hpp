@@ -32,6 +32,9 @@ constexpr std::uint32_t slot_begin(Kind kind, std::uint8_t slot) {
 constexpr std::uint32_t slot_bytes(Kind kind) {
   return kind == Kind::application ? application_slot_bytes : cell_slot_bytes;
 }
+static_assert(slot_begin(Kind::application, 0) + slot_bytes(Kind::application) == slot_begin(Kind::application, 1) &&
+              slot_begin(Kind::application, 1) + slot_bytes(Kind::application) == slot_begin(Kind::cell, 0) &&
+              slot_begin(Kind::cell, 0) + slot_bytes(Kind::cell) == slot_begin(Kind::cell, 1));
 
 /// Where the payload of a slot begins; its vectors stand there, which need a multiple of 512 (VTOR).
 constexpr std::uint32_t payload_address(Kind kind, std::uint8_t slot) { return slot_begin(kind, slot) + header_bytes; }

@@ -28,7 +28,6 @@ class Receiver {
   void aim_at(const ReceiverTarget& target) {
     to_ = target;
     active_ = false;
-    received_ = 0;
   }
   Kind kind() const { return to_.battery->kind; }
   std::uint8_t target() const { return to_.slot(); }

@@ -118,10 +118,7 @@ void UpdateServer::session(std::span<const std::uint8_t> request, Answer& answer
 void UpdateServer::security(std::span<const std::uint8_t> request, Answer& answer, std::uint64_t now_us) {
   if (!programming_) return answer.reject(conditions_not_correct);
   if (request.size() < 2) return answer.reject(wrong_length);
-  if (wrong_ >= most_wrong_keys) {
-    if (now_us - locked_since_us_ < locked_us) return answer.reject(delay_not_over);
-    wrong_ = most_wrong_keys - 1;
-  }
+  if (wrong_ >= most_wrong_keys && now_us - locked_since_us_ < locked_us) return answer.reject(delay_not_over);
   if (request[1] == 1) {
     if (request.size() != 2) return answer.reject(wrong_length);
     challenge_ = key_ && !unlocked_ ? surroundings_.challenge() & authentication::challenge_mask : 0;
