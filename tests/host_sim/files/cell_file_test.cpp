@@ -42,7 +42,7 @@ TEST(CellFile, Table9HasTheValuesAndLimitsOfThePaper) {
 }
 
 TEST(CellFile, EveryBuiltInCellIsAccepted) {
-  ASSERT_EQ(built_in_cells().size(), 6U);
+  ASSERT_EQ(built_in_cells().size(), 7U);
   for (const BuiltInCell& cell : built_in_cells()) EXPECT_EQ(read_cell(cell.name).name, cell.name);
 }
 
@@ -398,7 +398,7 @@ TEST(CellFile, AMissingFileIsRejectedWithTheNamesOfTheBuiltInCells) {
     read_cell("table10");
     FAIL();
   } catch (const BadInput& error) {
-    EXPECT_THAT(error.what(), HasSubstr("a123_esctoolbox_extended, nmc_lg_m50, nca_kim2011"));
+    EXPECT_THAT(error.what(), HasSubstr("a123_esctoolbox_extended, nmc_lg_m50, nca_kim2011, lto_madani2019"));
   }
   EXPECT_THROW(read_cell("/nowhere/cell.toml"), BadInput);
   EXPECT_THROW(read_cell("/tmp"), BadInput);
