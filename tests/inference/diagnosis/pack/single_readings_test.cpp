@@ -1,12 +1,15 @@
 // Packs whose log has single readings of the current, in slow rows: what the current did between them is unknown. Loads
 // and cells are simulated in fine steps by this file.
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <vector>
 
 #include <gtest/gtest.h>
 
+#include "diagnosis/pack/channels.hpp"
 #include "diagnosis/pack/current_kind.hpp"
+#include "diagnosis/pack/diagnose_pack.hpp"
 #include "diagnosis/pack/sampling_times.hpp"
 #include "diagnosis/pack/shared_current.hpp"
 #include "plant/random.hpp"
@@ -127,6 +130,20 @@ TEST(SingleReadings, TheWalkOfACountIsNoFaultOfTheSensorAndHasItsSigma) {
   EXPECT_GT(named_without, 0) << "a count without a walk is as good: this load tests nothing";
   EXPECT_GT(std::sqrt(squares), 0.4);
   EXPECT_LT(std::sqrt(squares), 1.4);
+}
+
+/// Five rows later this load is nearly alike, so that channels that are read within a row seem to be five rows late.
+TEST(SingleReadings, ALoadWithAPeriodOfSomeRowsMakesNoChannelLate) {
+  constexpr double period_s = 9.9;
+  dp::PackRecording pack = simulate({.rows_s = 2, .hours = 3, .span_s = 0.5}, [](double time_s) {
+                             return time_s > 300 && std::fmod(time_s, period_s) < 0.4 * period_s ? -3.0 : -0.1;
+                           }).pack;
+  dp::PackRecording cleaned = pack;
+  const dp::Channels channels = dp::check_channels(track_of(pack), cleaned);
+  EXPECT_TRUE(std::any_of(channels.cells.begin(), channels.cells.end(), [](const auto& c) { return c.lag_s != 0; }))
+      << "this load tests nothing";
+  for (const dp::PackFinding& f : dp::diagnose_pack(tests::table9, pack, {}).findings)
+    EXPECT_NE(f.cause, dp::Cause::late) << *f.cell << ": " << f.value << " +- " << f.sigma;
 }
 
 }  // namespace
