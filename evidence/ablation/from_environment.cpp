@@ -68,7 +68,6 @@ std::array<Number, 41> numbers() {
       number("log_spread", h.log_spread),
       number("spread_counts", h.spread_counts),
       number("log_spread_beyond", h.log_spread_beyond),
-      number("blocks_at_least", h.blocks_at_least),
       number("covered_at_least", h.covered_at_least),
       number("learned_within", h.learned_within),
       number("gross_times", h.gross_times),

@@ -23,10 +23,18 @@ double student_tail(double t, double freedom) {
   return t > 0 ? half : 1 - half;
 }
 
-/// Probability that one more value of a normal sample of n lies so many of its standard deviations above its mean. The
-/// standard deviation has a prior that counts as so many more values.
-double predictive_tail(double deviations, double n) {
-  return student_tail(deviations / std::sqrt(1 + 1 / n), n - 1 + healthy_limits.spread_counts);
+/// Probability that one more value of a normal sample of n lies so far above its mean. The standard deviation of the
+/// sample, spread, has a prior that counts as so many more values; another normal part, elsewhere, is known.
+double predictive_tail(double above, double spread, double elsewhere, double n) {
+  const double freedom = n - 1 + healthy_limits.spread_counts, scale = spread * std::sqrt(1 + 1 / n);
+  if (elsewhere <= 0) return student_tail(above / scale, freedom);
+  double sum = 0, weights = 0;  // the mean over the known part, by the trapezoidal rule
+  for (int k = -numerics.search.tail_points; k <= numerics.search.tail_points; ++k) {
+    const double z = k * numerics.search.tail_step, weight = std::exp(-z * z / 2);
+    sum += weight * student_tail((above - elsewhere * z) / scale, freedom);
+    weights += weight;
+  }
+  return sum / weights;
 }
 
 /// ln of each block's gain over the usual level of the cause on the other blocks; the largest of all causes.
@@ -58,9 +66,9 @@ double most_blocks(double rate) { return std::ceil(1 / rate) - 1; }
 }  // namespace
 
 double hours_if_none_shows_any(double gain, double duration_h, double rate) {
-  const double deviations = std::log1p(std::max(gain, 0.0) / thresholds.decision.detected) / healthy_limits.log_spread;
-  double blocks = healthy_limits.blocks_at_least;
-  while (blocks < most_blocks(rate) && predictive_tail(deviations, blocks) > rate) ++blocks;
+  const double above = std::log1p(std::max(gain, 0.0) / thresholds.decision.detected);
+  double blocks = 1;
+  while (blocks < most_blocks(rate) && predictive_tail(above, healthy_limits.log_spread, 0, blocks) > rate) ++blocks;
   return blocks * duration_h;
 }
 
@@ -113,14 +121,14 @@ HealthyComparison HealthyNull::compare(const std::string& cause, double gain, do
         elsewhere > 0 ? measurement::normal_tail((ratio - level) / elsewhere) : static_cast<double>(level >= ratio);
   }
   c.false_alarm = (1 + as_extreme) / (n + 1);
-  if (exceeds_all && n >= healthy_limits.blocks_at_least)
-    c.false_alarm = std::min(c.false_alarm, predictive_tail((ratio - mean_) / std::hypot(spread_, elsewhere), n));
+  if (exceeds_all && n > 0)
+    c.false_alarm = std::min(c.false_alarm, predictive_tail(ratio - mean_, spread_, elsewhere, n));
   c.stands_out = c.false_alarm <= rate_;
   if (c.stands_out || !exceeds_all || (n > 0 && gain <= c.healthy_gain)) return c;
   // by rank alone, unless fewer blocks like these would do
   double needed = most_blocks(rate_);
-  for (double more = std::max(n, healthy_limits.blocks_at_least); n > 0 && more < needed; ++more) {
-    if (predictive_tail((ratio - mean_) / spread_, more) <= rate_) needed = more;
+  for (double more = n; n > 0 && more < needed; ++more) {
+    if (predictive_tail(ratio - mean_, spread_, 0, more) <= rate_) needed = more;
   }
   const double block_h = n > 0 ? hours_ / n : healthy_limits.block_h;
   c.hours_needed = std::max(needed, n + 1) * block_h;

@@ -11,12 +11,11 @@ struct HealthyThresholds {
                                     ///< square of an effect that differs by a quarter. A few blocks may agree by
                                     ///< chance
   double block_h = 0.5;             ///< [h] expected of a block, without any block
-  double spread_counts = 1;         ///< as if so many more blocks had shown log_spread. With 1 false alarms keep
-                                    ///< their rate up to a spread of 1.5; pooled over 17 sets of NASA B0005, B0007
-                                    ///< and B0025 it is 0.48
+  double spread_counts = 2;         ///< as if so many more blocks had shown log_spread. With 2 or 3 the spreads of 46
+                                    ///< sets of NASA blocks (0.38 pooled) are most probable; with 2 false alarms keep
+                                    ///< their rate up to a spread of 1.5
   double log_spread_beyond = 2.1;   ///< log_spread where no healthy block was. In the second halves of eight A123
                                     ///< drives the largest gain is off by 2.3 (RMS), 1.0 of it within the blocks
-  double blocks_at_least = 2;       ///< for a Student distribution
   double soc_beyond = 0.05;         ///< soc beyond that of the healthy blocks which they still stand for
   double temperature_beyond_k = 5;  ///< [K]
   double current_beyond = 1.25;     ///< times their largest current

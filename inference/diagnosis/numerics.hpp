@@ -81,6 +81,8 @@ struct Numerics {
     double limit_step = 1.25;                   ///< factor from one detection limit tried to the next
     double least_gain = 0.5;                    ///< of a cause on a healthy block; less is not stored
     double most_gain = 1e12, gain_step = 1e-3;  ///< of a bisection, in ln
+    int tail_points = 160;                      ///< on each side, of the mean of a tail over a normal part
+    double tail_step = 0.05;                    ///< between them, in standard deviations
     double progress_steps = 20;                 ///< after which 63 % are shown as done
   };
 
