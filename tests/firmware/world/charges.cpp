@@ -2,6 +2,7 @@
 // with what goes wrong. The chargers are those of tests/firmware/charger_models.hpp; their frames pass the bus, and
 // their current flows in the circuit. The truck's controller repeats that it asks for nothing.
 #include <algorithm>
+#include <cmath>
 #include <memory>
 
 #include <fmt/format.h>
@@ -36,6 +37,12 @@ class Charge {
   double opens(double within_s) {
     const double ms = world_.run_until([&] { return !world_.any_main_closed(); }, 1e3 * within_s);
     if (ms < 0) fail("stays closed");
+    return 1e-3 * ms;
+  }
+  /// Returns the seconds until no current flows: the charger contactor is open.
+  double ends(double within_s) {
+    const double ms = world_.run_until([&] { return std::abs(world_.truck.current_a()) < 0.5; }, 1e3 * within_s);
+    if (ms < 0) fail("goes on");
     return 1e-3 * ms;
   }
   void stays_open(double for_s) {
@@ -95,12 +102,14 @@ class Charge {
   double highest_v_ = 0;
 };
 
-constexpr double upper_limit_v = 3.65, severe_v = 3.815;
+/// The cells of the circuit have no steep end: beyond 100 % their curve goes on with its last slope, 1.3 V for 100 %,
+/// so that the target of 3.55 V is at 107 % without a current. charger_loop_test has the steep end.
+constexpr double fullest = 1.08, upper_limit_v = 3.65, severe_v = 3.815;
 
 void from_a_fifth_to_full(Charge& charge, firmware::Charger&, Outcome& outcome) {
   if (!charge.begins()) return;
   outcome.values["ended"] = charge.opens(2 * 3'600);
-  charge.expect(charge.soc() > 0.97 && charge.soc() < 1.03, "not full");
+  charge.expect(charge.soc() > 0.97 && charge.soc() < fullest, "not full");
   charge.expect(charge.highest_v() < upper_limit_v, "above the limit of a cell");
   charge.no_fault();
   charge.stays_open(120);  // still plugged in: the charge is over
@@ -159,7 +168,7 @@ void ignores_the_limit(Charge& charge, firmware::Charger& charger, Outcome& outc
   charger.own_target_v = 70;
   charger.ignores_limit = true;
   if (!charge.begins()) return;
-  outcome.values["ended"] = charge.opens(3'600);
+  outcome.values["ended"] = charge.ends(3'600);
   charge.expect(charge.highest_v() < severe_v, "above the severe limit of a cell");
   charge.a_fault();
 }
