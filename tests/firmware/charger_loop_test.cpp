@@ -20,17 +20,6 @@ namespace {
 constexpr std::size_t cells = 16;
 constexpr double step_s = 0.1, capacity_ah = 6;
 
-/// The reference cell, whose voltage rises steeply once the positive electrode is empty of lithium: 0.1 V per percent.
-/// The curve of the paper ends at 100 %.
-plant::MonotoneCurve ocv_beyond_full() {
-  const plant::MonotoneCurve ocv = plant::table9_ocv_v();
-  std::vector<plant::Point> points;
-  for (int k = 0; k <= 50; ++k) points.push_back({k / 50.0, ocv.at(k / 50.0)});
-  points.push_back({1.01, points.back().y + 0.1});
-  points.push_back({1.02, points.back().y + 0.15});
-  return plant::MonotoneCurve(points);
-}
-
 /// The forklift board with the cell table9.
 struct LoopCell : Table9Board<cells> {
   static const protection::ProtectionPlan& plan() {

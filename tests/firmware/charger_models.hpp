@@ -1,5 +1,6 @@
-// Chargers on the bus, written from what their makers publish (firmware/can/messages.md); they share no code with the
-// firmware. A test drives them around the application on this machine or around the flashed image in a truck.
+// Chargers on the bus, written from what their makers publish (firmware/can/messages.md), and the cells that they fill.
+// They share no code with the firmware. A test runs them around the application on this machine or around the flashed
+// image in a truck.
 #pragma once
 
 #include <algorithm>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "hal/can.hpp"
+#include "plant/truth_cell.hpp"
 
 namespace bms::firmware {
 
@@ -106,5 +108,16 @@ class CanopenCharger : public Charger {
   double next_s_ = 0, received_s_ = -100, allowed_a_ = 0;
   bool ready_ = false;
 };
+
+/// The reference cell, whose voltage rises steeply once the positive electrode is empty of lithium: 0.1 V per percent.
+/// The curve of the paper ends at 100 %.
+inline plant::MonotoneCurve ocv_beyond_full() {
+  const plant::MonotoneCurve ocv = plant::table9_ocv_v();
+  std::vector<plant::Point> points;
+  for (int k = 0; k <= 50; ++k) points.push_back({k / 50.0, ocv.at(k / 50.0)});
+  points.push_back({1.01, points.back().y + 0.1});
+  points.push_back({1.02, points.back().y + 0.15});
+  return plant::MonotoneCurve(points);
+}
 
 }  // namespace bms::firmware
