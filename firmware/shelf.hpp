@@ -3,14 +3,14 @@
 // silent bus. A cell that rests there is empty; what the battery needs when it is off is less than what cells lose by
 // themselves (boards/stm32f405_forklift/README.md).
 //
-// A workshop's command (ship mode) does the same two seconds later, on any bus and with any voltage.
+// A workshop's command (ship mode) does the same two seconds later, on any bus and with any voltage. Both wait until
+// the truck's DC link is empty, because the BQ76952 would not enter SHUTDOWN before.
 //
 // The driver's key or the charger's plug switches it on again. While its supply does not fall, the minute begins again.
 //
 // Only in a build with BMS_SWITCHES_OFF, because it takes a wiring that no firmware can check: without REG1 of the
 // front end in the supply the core goes on without readings, and without TS2 at key and plug nothing ends SHUTDOWN. If
-// TS2 is low or LD high at the command, the BQ76952 waits, with its outputs off, until both have ended; the model of
-// the chip (tests/hal/bq76952_model.hpp) does not have this.
+// TS2 is low at the command although key and plug are off, the BQ76952 waits, with its outputs off, until that ends.
 #pragma once
 
 #include <cstdint>
@@ -34,15 +34,15 @@ class Shelf {
   }
 
   /// Returns true if the battery is to be switched off now. used: anything but rest with open contactors; silent: the
-  /// bus.
-  constexpr bool update(std::int32_t lowest_cell_uv, std::int32_t empty_uv, bool used, bool silent,
+  /// bus; ready: hal::may_switch_off().
+  constexpr bool update(std::int32_t lowest_cell_uv, std::int32_t empty_uv, bool used, bool silent, bool ready,
                         std::uint64_t now_us) {
     used_ = used;
     shipping_ = shipping_ && !used;
     const bool low = !used && silent && lowest_cell_uv != measurement::no_reading && lowest_cell_uv < empty_uv;
     if (!counting_) since_us_ = now_us;
     counting_ = low || shipping_;
-    if (!counting_ || now_us - since_us_ < (shipping_ ? answer_us : low_for_us)) return false;
+    if (!counting_ || !ready || now_us - since_us_ < (shipping_ ? answer_us : low_for_us)) return false;
     shipping_ = false;
     since_us_ = now_us;
     return true;

@@ -100,7 +100,7 @@ class TruckSide {
                           inputs.auxiliary.main_minus_closed;
       const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
       return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release,
-                           wanted || !rests || closed, !hal::can_listening(), pack.time_us);
+                           wanted || !rests || closed, !hal::can_listening(), hal::may_switch_off(), pack.time_us);
     }
   }
 

@@ -14,6 +14,9 @@ inline constexpr std::uint64_t silence_before_stop_us = 10'000'000;
 /// Call once per sample. parked: all contactors are open, and nobody asks for power.
 void set_parked(bool parked);
 
+/// switch_off() would act at once: the truck's side of main plus has no voltage, which holds the measuring chip on.
+bool may_switch_off();
+
 /// Switches the measuring chip off, and with it the supply of this core where it is wired so, unless key or plug keep
 /// it on. Only of a build with BMS_SWITCHES_OFF (firmware/shelf.hpp). The stored state is complete before. Returns,
 /// because the supply does not fall at once.

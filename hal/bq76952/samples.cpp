@@ -77,6 +77,12 @@ FrontEndHealth front_end_health() {
   return health;
 }
 
+/// With LD above its threshold (0.8 V or more assumed, 1.45 V typical: E2E 1356033) the chip would wait with its
+/// outputs off, and its pins would contradict the protections.
+bool may_switch_off() {
+  constexpr std::int32_t low_uv = 700'000;
+  return front_end.dc_link_uv() != measurement::no_reading && front_end.dc_link_uv() < low_uv;
+}
 void switch_off() { front_end.shut_down(); }
 
 void power_path_set(const PowerPath& wanted) {

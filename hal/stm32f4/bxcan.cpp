@@ -4,8 +4,7 @@
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
 // queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
 // mailbox number instead of age.
-// Reception: filters for accepted_ids() (standard frames) and long_ids (29 bits), the controller's FIFO of three, an
-// interrupt, a ring of 64.
+// Reception: filters for accepted_ids() (11 bits) and long_ids (29 bits), a FIFO of three, an interrupt, a ring of 64.
 //
 // Going on the bus (32.4) and recovery after bus-off (32.7.6) are phases that service() checks. Each has a timeout
 // after which it is tried again later; no function waits in a loop for the bus.
@@ -16,8 +15,7 @@
 //                   frames. can_listening() is false for a second or until a frame arrives; then sending starts again.
 //   no idle bus     100 ms after the request (longer below 250 kbit/s, where a recovery on a full bus needs it): counts
 //                   a failed start and tries again after the rest
-//   no crystal      never on the bus: the internal oscillator has an error of up to 8 % (datasheet, HSI), a bit allows
-//                   0.5 %
+//   no crystal      never on the bus: the internal oscillator errs by up to 8 % (datasheet, HSI), a bit allows 0.5 %
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -318,7 +316,9 @@ bool can_suspend(std::uint64_t quiet_us) {
   ask_for_initialisation();
   suspended = true;
   while ((can1_msr() & msr_inak) == 0 && now_us() - phase_since_us < 50) continue;
-  return (can1_msr() & msr_inak) != 0;
+  const bool idle = (can1_msr() & msr_inak) != 0;
+  if (!idle) can_active();  // a frame is on the wire
+  return idle;
 }
 
 void can_active() { active_us = now_us(); }

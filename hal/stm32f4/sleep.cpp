@@ -2,16 +2,20 @@
 // the pins stay. It ends by
 //
 //   the wake-up timer of the real-time clock (26.3.6), in time for the next sample; key and plug are read with it
-//   a falling edge of CAN RX (PB8): its frame is lost, as no node has acknowledged it, its sender repeats it
+//   a falling edge of CAN RX (PB8): its frame is lost
 //   the supply detector, a lost contact and the coil supply, as always
 //
 // PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230).
+//
+// The CAN controller is off the bus from before the stop until the next sample is processed, also while the core is
+// awake. An edge of CAN RX in all this time means that a node talks: the chip stays awake and receives its next frame.
 //
 // The real-time clock measures the time asleep, to 1/256 s. It needs the 32,768 Hz crystal: without it, or if it dies
 // later, which its ready flag does not show, the chip waits for interrupts instead.
 #include "hal/sleep.hpp"
 
 #include <optional>
+#include <utility>
 
 #include "hal/can_suspend.hpp"
 #include "hal/clock.hpp"
@@ -42,6 +46,7 @@ constexpr std::uint64_t start_us = 4'000, shortest_us = 8'000;
 constexpr unsigned max_polls = 20'000;  // 1 ms; the longest wait is two cycles of 32,768 Hz
 
 bool parked = false, clock_died = false;
+bool off_the_bus = false;  ///< has been since watch_bus()
 
 bool clock_runs() {
   if ((rcc_bdcr() & lse_ready) == 0) return false;
@@ -120,27 +125,31 @@ std::uint64_t stop() {
 
 constexpr std::uint32_t only_listens = 1U << 12;  // PB12
 
+/// Call while the controller is on the bus. From now on the line keeps an edge; its interrupt is off.
+void watch_bus() {
+  rcc_apb2enr() = rcc_apb2enr() | 1U << 14;           // SYSCFG
+  syscfg_exticr3() = (syscfg_exticr3() & ~15U) | 1U;  // line 8: port B
+  exti_ftsr() = exti_ftsr() | receive_line;
+  exti_imr() = exti_imr() | receive_line;
+  exti_pr() = receive_line;
+}
+
+/// An edge since watch_bus() wakes the core at once.
 void listen() {
   gpiob_bsrr() = only_listens;
   gpiob_moder() = (gpiob_moder() & ~(3U << 24)) | 1U << 24;
-  rcc_apb2enr() = rcc_apb2enr() | 1U << 14;           // SYSCFG
-  syscfg_exticr3() = (syscfg_exticr3() & ~15U) | 1U;  // line 8: port B
   exti_rtsr() = exti_rtsr() | timer_line;
-  exti_ftsr() = exti_ftsr() | receive_line;
-  exti_pr() = timer_line | receive_line;
-  exti_imr() = exti_imr() | timer_line | receive_line;
+  exti_pr() = timer_line;
+  exti_imr() = exti_imr() | timer_line;
+  nvic_icpr0() = interrupts;  // what is left; a line with its flag set is pending again
   nvic_iser0() = interrupts;
 }
 
-/// Returns true if a node has begun a frame.
-bool end_listening() {
-  const bool began = (exti_pr() & receive_line) != 0;
+void end_listening() {
   gpiob_bsrr() = only_listens << 16;
-  exti_imr() = exti_imr() & ~(timer_line | receive_line);
+  exti_imr() = exti_imr() & ~timer_line;
   nvic_icer0() = interrupts;
-  exti_pr() = timer_line | receive_line;
-  nvic_icpr0() = interrupts;
-  return began;
+  exti_pr() = timer_line;
 }
 
 }  // namespace
@@ -148,10 +157,12 @@ bool end_listening() {
 void set_parked(bool now) { parked = now; }
 
 void rest_until(std::uint64_t due_us) {
+  if (std::exchange(off_the_bus, false) && (exti_pr() & receive_line) != 0) can_active();
   const std::uint64_t now = now_us();
-  if (!parked || clock_died || due_us < now + start_us + shortest_us || !clock_runs() ||
-      !can_suspend(silence_before_stop_us))
-    return wait_for_interrupt();
+  if (!parked || clock_died || due_us < now + start_us + shortest_us || !clock_runs()) return wait_for_interrupt();
+  watch_bus();
+  if (!can_suspend(silence_before_stop_us)) return wait_for_interrupt();
+  off_the_bus = true;
   const auto before = day_ticks();
   const std::uint64_t before_us = now_us();
   if (!before || !start_timer(static_cast<std::uint32_t>((due_us - now - start_us) * timer_hz / 1'000'000))) {
@@ -162,12 +173,11 @@ void rest_until(std::uint64_t due_us) {
   const std::uint64_t awake_us = stop() - before_us;  // in both clocks
   const auto after = day_ticks();
   const std::uint32_t ticks = after ? (*after + ticks_per_day - *before) % ticks_per_day : 0;
-  const bool began = end_listening();
+  end_listening();
   end_timer();
   const std::uint64_t since_us = std::uint64_t{ticks} * 1'000'000 / ticks_per_s;
   resume_clock(since_us > awake_us ? since_us - awake_us : 0);
   asm volatile("cpsie i" ::: "memory");
-  if (began) can_active();
 }
 
 }  // namespace bms::hal

@@ -1,5 +1,9 @@
 // The build of the application with BMS_CLOSES_BY_INPUTS true: key and charger plug request power without a message,
 // and without any authority (T-23 of docs/safety/threats.md).
+#include <algorithm>
+#include <set>
+
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/firmware/truck_day.hpp"
@@ -48,6 +52,47 @@ TEST(ClosingByInputs, AStopOpensUntilTheKeyIsTurned) {
   t.run(12);
   t.key_input = true;
   EXPECT_TRUE(t.key_drives());
+}
+
+/// From before the first request through self-test, precharge and closed contactors to an emergency stop. Sent once, or
+/// with every sample.
+TEST(ClosingByInputs, AStopInEveryStateStandsUntilKeyOrPlugWasOff) {
+  using State = can::ContactorState;
+  for (const bool plug : {false, true}) {
+    std::set<std::uint32_t> states;
+    int cases = 0, slowest = 0;
+    for (const bool once : {true, false}) {
+      for (int at = 1; at < 130; ++at) {
+        SilentTruck t;
+        bool& input = plug ? t.seen_plug : t.key_input;
+        input = true;
+        for (int k = 0; k < at; ++k) {
+          t.emergency_stop = k >= 100 && k < 103;
+          t.step();
+        }
+        t.emergency_stop = false;
+        states.insert(t.state());
+        ++cases;
+        for (int k = 0; k < 300; ++k) {
+          if (k == 0 || !once) t.stop();
+          t.step();
+          if (t.any_closed()) slowest = std::max(slowest, k + 1);
+          ASSERT_LE(slowest, 3) << at << ": closed " << 0.1 * k << " s after a stop";
+        }
+        if (at % 10 != 0 || at >= 100) continue;
+        input = false;
+        t.run(6);
+        input = true;
+        t.run(10);
+        ASSERT_TRUE(plug ? t.charges() : t.drives()) << at << ": it was off and is on again";
+      }
+    }
+    fmt::print("{}: {} stops in {} states, contacts open within {:.1f} s\n", plug ? "plug" : "key", cases,
+               states.size(), 0.1 * slowest);
+    for (const std::uint32_t state : {State::state_off, State::state_self_test, State::state_precharge,
+                                      plug ? State::state_charge : State::state_drive})
+      EXPECT_TRUE(states.contains(state)) << state;
+  }
 }
 
 TEST(ClosingByInputs, ThePlugChargesAndKeepsTheKeyFromDriving) {

@@ -25,6 +25,7 @@ void host_hal::begin() {
   second_current_reading_ua = measurement::no_reading;
   parked = false;
   switched_off = 0;
+  load_side_empty = true;
   cause = hal::ResetCause::power_on;
   fault.reset();
   fed = 0;
@@ -87,6 +88,7 @@ void truck_outputs_set(std::uint32_t outputs) { host_hal::truck_outputs = output
 Insulation insulation() { return host_hal::insulation; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 void set_parked(bool parked) { host_hal::parked = parked; }
+bool may_switch_off() { return host_hal::load_side_empty; }
 void switch_off() { ++host_hal::switched_off; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }

@@ -38,6 +38,7 @@ inline bool second_current_sensor = false;  ///< is fitted
 inline std::int32_t second_current_reading_ua = measurement::no_reading;
 inline bool parked = false;
 inline unsigned switched_off = 0;  ///< times
+inline bool load_side_empty = true;
 inline hal::ResetCause cause = hal::ResetCause::power_on;
 inline std::optional<hal::FaultRecord> fault;
 inline int fed = 0;

@@ -320,9 +320,10 @@ TEST(Shelf, WaitsForAMinuteOfRest) {
   constexpr std::int32_t empty_uv = 2'908'000;
   Shelf shelf;
   std::uint64_t us = 0;
+  bool ready = true;
   const auto after = [&](int seconds, std::int32_t uv, bool used = false, bool silent = true) {
     bool off = false;
-    for (int k = 0; k < 10 * seconds; ++k) off = shelf.update(uv, empty_uv, used, silent, us += 100'000) || off;
+    for (int k = 0; k < 10 * seconds; ++k) off = shelf.update(uv, empty_uv, used, silent, ready, us += 100'000) || off;
     return off;
   };
   EXPECT_FALSE(after(3'600, empty_uv));
@@ -333,22 +334,27 @@ TEST(Shelf, WaitsForAMinuteOfRest) {
   EXPECT_FALSE(after(3'600, empty_uv - 1, false, false)) << "while somebody listens";
   EXPECT_FALSE(after(3'600, measurement::no_reading));
   EXPECT_TRUE(after(61, empty_uv - 1));
+  ready = false;
+  EXPECT_FALSE(after(3'600, empty_uv - 1)) << "the DC link is charged";
+  ready = true;
+  EXPECT_TRUE(after(1, empty_uv - 1)) << "at once when it is empty";
 }
 
 TEST(Shelf, AsksOnceAMinuteIfTheSupplyDoesNotFall) {
   Shelf shelf;
   int times = 0;
   for (std::uint64_t us = 0; us <= 600'000'000; us += 100'000)
-    times += shelf.update(2'500'000, 2'908'000, false, true, us);
+    times += shelf.update(2'500'000, 2'908'000, false, true, true, us);
   EXPECT_EQ(times, 10);
 }
 
 TEST(Shelf, OfAWorkshopWaitsForItsAnswerAndNotForVoltageOrBus) {
   Shelf shelf;
   std::uint64_t us = 0;
+  bool ready = true;
   const auto off_after_s = [&](bool used) {
     for (int k = 1; k < 1'000; ++k) {
-      if (shelf.update(3'300'000, 2'908'000, used, false, us += 100'000)) return 0.1 * k;
+      if (shelf.update(3'300'000, 2'908'000, used, false, ready, us += 100'000)) return 0.1 * k;
     }
     return -1.0;
   };
@@ -361,6 +367,11 @@ TEST(Shelf, OfAWorkshopWaitsForItsAnswerAndNotForVoltageOrBus) {
   EXPECT_LT(off_after_s(true), 0);
   EXPECT_FALSE(shelf.ship());
   EXPECT_LT(off_after_s(false), 0) << "used meanwhile: no more";
+  EXPECT_TRUE(shelf.ship());
+  ready = false;
+  EXPECT_LT(off_after_s(false), 0) << "the DC link is charged";
+  ready = true;
+  EXPECT_NEAR(off_after_s(false), 0.1, 0.05);
 }
 
 /// A battery with an empty cell and all else at rest, for two minutes.

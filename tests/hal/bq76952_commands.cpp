@@ -80,7 +80,9 @@ bool Bq76952Model::control_command(std::uint16_t address) {
       if (previous_command_ == address && !config_) deep_sleep = true;
       return true;
     case 0x0010:  // SHUTDOWN; sealed it has to be sent twice
-      if (!sealed || previous_command_ == address) shutdown_ = true;
+      if (sealed && previous_command_ != address) return true;
+      shutdown_ = !in_.ts2_low && in_.ld_v < ld_high_v;
+      ending_ = !shutdown_;
       return true;
     case 0x0012:  // RESET
       if (!sealed) reset();

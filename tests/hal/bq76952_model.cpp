@@ -35,7 +35,7 @@ void Bq76952Model::reset() {
   measurement_.reset();
   protections_.reset();
   checked_ = crc_from_otp;
-  config_ = shutdown_ = false;
+  config_ = shutdown_ = ending_ = false;
   was_reset_ = true;
   balancing_ = 0;
   low_ = high_ = 0;
@@ -101,6 +101,10 @@ void Bq76952Model::step(std::uint64_t us) {
   const double s = 1e-6 * static_cast<double>(us);
   time_us += us;
   charge_as += in_.shunt_v / (1e-3 * shunt_mohm) * s;
+  if (ending_ && !in_.ts2_low && in_.ld_v < ld_high_v) {
+    ending_ = false;
+    shutdown_ = true;
+  }
   // SHUTDOWN ends when TS2 is pulled low or LD is above its wake threshold, at most 2.25 V (SLUSE13B, 7.7)
   if (shutdown_ && (in_.ts2_low || in_.ld_v > 2.25)) reset();
   if (time_us >= balancing_until_us_ || !runs()) balancing_ = 0;
@@ -153,13 +157,13 @@ bool Bq76952Model::fet_on(bool turned_off, std::uint8_t off_bit, bool test) cons
 
 bool Bq76952Model::dsg_asserted() const {
   const bool off = protections_.turns_dsg_off();
-  return off || (config_ && variant_.config_update_asserts_pins) ||
+  return off || ending_ || (config_ && variant_.config_update_asserts_pins) ||
          (variant_.pins_follow_fet_drivers && !fet_on(off, dsg_off, (tests_ & dsg_test) != 0));
 }
 
 bool Bq76952Model::chg_asserted() const {
   const bool off = protections_.turns_chg_off();
-  return off || (config_ && variant_.config_update_asserts_pins) ||
+  return off || ending_ || (config_ && variant_.config_update_asserts_pins) ||
          (variant_.pins_follow_fet_drivers && !fet_on(off, chg_off, (tests_ & chg_test) != 0));
 }
 

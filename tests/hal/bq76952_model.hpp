@@ -68,6 +68,10 @@ class Bq76952Model {
   bool checked() const { return checked_; }
   bool in_config() const { return config_; }
   bool in_shutdown() const { return shutdown_; }
+  /// "Soft SHUTDOWN" (TI's FAQ, E2E 1273427): after the command TS2 is low or LD high. The FETs are off, REG1 and the
+  /// bus work; when both have ended, SHUTDOWN follows. RESET ends it, which the FAQ says of the pin RST_SHUT only.
+  bool in_soft_shutdown() const { return ending_; }
+  double ld_high_v = 1.45;  ///< typical (E2E 1356033)
   std::uint16_t balancing() const { return balancing_; }
   const bq::Protections& protections() const { return protections_; }
   const bq::Measurement& measurement() const { return measurement_; }
@@ -130,8 +134,8 @@ class Bq76952Model {
   std::uint16_t alarm_ = 0, alarm_before_ = 0, alarm_enable_ = 0xF800, balancing_ = 0, previous_command_ = 0;
   std::uint16_t outputs_high_ = 0;         ///< general-purpose outputs that subcommands set
   std::uint8_t host_off_ = 0, tests_ = 0;  ///< FET_CONTROL; FETs on in test mode, bits of Manufacturing Status
-  bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false, shutdown_ = false, own_circuit_ = false,
-       fet_en_ = false, pf_en_ = false;
+  bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false, shutdown_ = false, ending_ = false,
+       own_circuit_ = false, fet_en_ = false, pf_en_ = false;
   unsigned quarters_seen_ = 0;
 };
 

@@ -454,6 +454,31 @@ TEST_F(ChipModel, OutputsFloatInShutdownAndTheSettingsAreLost) {
   EXPECT_EQ(chip_.memory(0x9302, 1), 0U);
 }
 
+TEST_F(ChipModel, ShutdownWaitsForTs2AndLdWithItsOutputsOff) {
+  const std::array<void (*)(Bq76952Inputs&), 2> causes{[](Bq76952Inputs& i) { i.ts2_low = true; },
+                                                       [](Bq76952Inputs& i) { i.ld_v = 20; }};
+  for (const auto& hold_on : causes) {
+    in.ts2_low = false;
+    in.ld_v = 0.2;
+    configure_outputs();
+    hold_on(in);
+    wait_us(1'000);
+    subcommand(0x0010);
+    wait_s(5);
+    EXPECT_FALSE(chip_.in_shutdown());
+    EXPECT_EQ(chip_.ddsg_level(), PinLevel::low) << "REG1 is on";
+    EXPECT_EQ(chip_.dchg_level(), PinLevel::low);
+    EXPECT_EQ(read(0x20, 2), 3'300U) << "the bus works";
+    in.ts2_low = false;
+    in.ld_v = 0.2;
+    wait_us(1'000);
+    EXPECT_TRUE(chip_.in_shutdown());
+    in.ts2_low = true;
+    wait_us(1'000);
+    EXPECT_FALSE(chip_.in_shutdown() || chip_.in_soft_shutdown());
+  }
+}
+
 TEST_F(ChipModel, ConfigUpdateStopsMeasurementsAndProtectionsAndAssertsTheOutputs) {
   configure_outputs({{bq::enabled_protections_a, bq::cuv}});
   wait_s(0.1);

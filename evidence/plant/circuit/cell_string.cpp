@@ -1,6 +1,7 @@
 #include "plant/circuit/cell_string.hpp"
 
 #include <cmath>
+#include <utility>
 
 namespace bms::plant {
 
@@ -11,7 +12,7 @@ constexpr double linear_soc = 1e-3;
 
 }  // namespace
 
-CellString::CellString(const std::vector<StringCell>& cells) {
+CellString::CellString(const std::vector<StringCell>& cells, MonotoneCurve ocv_v) : ocv_curve_(std::move(ocv_v)) {
   for (const StringCell& cell : cells) {
     cells_.push_back({.capacity_as = 3'600 * cell.capacity_ah,
                       .soc = cell.soc,

@@ -23,7 +23,7 @@ struct StringCell {
 
 class CellString {
  public:
-  explicit CellString(const std::vector<StringCell>& cells);
+  explicit CellString(const std::vector<StringCell>& cells, MonotoneCurve ocv_v = table9_ocv_v());
 
   std::size_t size() const { return cells_.size(); }
   double emf_v() const { return emf_v_; }  ///< with the voltages of the RC branches and of bleeding
@@ -46,7 +46,7 @@ class CellString {
   void linearise();
   void sum_up();
 
-  MonotoneCurve ocv_curve_ = table9_ocv_v();
+  MonotoneCurve ocv_curve_;
   CircuitCurves curves_ = table9_circuit();
   std::vector<Cell> cells_;
   double emf_v_ = 0, r0_ohm_ = 0;

@@ -45,7 +45,7 @@ double hall_pin_v(const HallParameters& hall, double current_a) {
 
 Truck::Truck(const TruckParameters& parameters)
     : parameters_(parameters),
-      cells_(parameters.cells),
+      cells_(parameters.cells, parameters.ocv_v),
       network_(build_network(circuit_, parameters_, cells_)),
       contactors_{{{parameters.relay[0], 4 * parameters.seed},
                    {parameters.relay[1], 4 * parameters.seed + 1},

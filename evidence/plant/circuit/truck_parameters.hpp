@@ -65,6 +65,7 @@ struct PrechargeResistor {
 
 struct TruckParameters {
   std::vector<StringCell> cells = std::vector<StringCell>(16);
+  MonotoneCurve ocv_v = table9_ocv_v();  ///< of each cell
   double fuse_ohm = 0.3e-3, shunt_ohm = 1e-4;
   double main_contact_ohm = 0.2e-3;  ///< of K1, K2 and K4
   double open_contact_ohm = 1e10;    ///< chosen; of all

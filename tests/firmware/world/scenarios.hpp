@@ -42,6 +42,7 @@ Result run_supply_dips(const Extent& extent);
 Result run_fault_matrix(const Extent& extent);
 Result run_overloads(const Extent& extent);
 Result run_shift(const Extent& extent);
-Result run_month(const Extent& extent);  ///< ordinary days: three shifts each, with what a driver does
+Result run_charges(const Extent& extent);  ///< chargers of both protocols, on images with their profiles
+Result run_month(const Extent& extent);    ///< ordinary days: three shifts each, with what a driver does
 
 }  // namespace bms::world

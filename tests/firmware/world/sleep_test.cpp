@@ -4,9 +4,11 @@
 
 #include <fmt/format.h>
 
+#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "files/cell_file.hpp"
 #include "files/text_file.hpp"
 #include "images/chosen_image.hpp"
+#include "tests/firmware/world/cases.hpp"
 #include "tests/firmware/world/operating.hpp"
 
 namespace bms::world {
@@ -23,19 +25,18 @@ Pack pack_with(const images::Choice& choice) {
   pack.image = images::chosen_image("stm32f405_forklift", files::read_cell("table9"), choice);
   return pack;
 }
-Pack pack_that_sleeps() { return pack_with({"sleeps", {"-DBMS_SLEEPS=ON"}}); }
 
 /// Wired to switch itself off, with a key that is read.
 Pack pack_that_switches_off() {
   return pack_with(
-      {"switches_off",
-       {"-DBMS_SLEEPS=ON", "-DBMS_SWITCHES_OFF=ON", "-DBMS_INPUTS=key;charger_plug;coil_supply;interlock;crash"}});
+      {"switches_off", {"-DBMS_SWITCHES_OFF=ON", "-DBMS_INPUTS=key;charger_plug;coil_supply;interlock;crash"}});
 }
 
 /// Parked, with a silent bus, since so long that the chip stops between the samples.
 class Sleep : public ::testing::Test {
  protected:
-  explicit Sleep(const Pack& pack = pack_that_sleeps()) : pack_(pack), world_(pack_.image, typical_setup(pack_)) {
+  explicit Sleep(const Pack& pack = pack_of(6), double ld_ohm = plant::FrontEndInputs{}.ld_ohm)
+      : pack_(pack), world_(pack_.image, setup_of(pack_, ld_ohm)) {
     world_.fit_clock();
     world_.run_ms(4'000);  // the crystal of the clock starts
     EXPECT_EQ(world_.board.stops, 0U) << "the truck's controller talks";
@@ -45,6 +46,11 @@ class Sleep : public ::testing::Test {
   }
   ~Sleep() override { EXPECT_THAT(world_.violations(), IsEmpty()); }
 
+  static WorldSetup setup_of(const Pack& pack, double ld_ohm) {
+    WorldSetup setup = typical_setup(pack);
+    setup.truck.front_end.ld_ohm = ld_ohm;
+    return setup;
+  }
   double asleep_of(double ms) {
     const double before_ms = world_.board.stopped_ms();
     world_.run_ms(ms);
@@ -90,6 +96,57 @@ TEST_F(Sleep, AFrameOfTheTruckWakesTheBoard) {
   EXPECT_GT(asleep_of(30'000), 0.4) << "and asleep again";
 }
 
+/// A node whose frames another one acknowledges, so that it repeats none, and whose clock is that of the samples: each
+/// of its frames meets the same part of a cycle of 0.1 s.
+class NodeInStep {
+ public:
+  explicit NodeInStep(TruckWorld& world) : world_(world) {}
+  void send_at(double ms) {
+    can::Command command;
+    command.code = can::Command::code_request;
+    counter_ = can::next(counter_);
+    world_.board.can.others_acknowledge = true;
+    world_.board.can.others.push_back({firmware::wire_frame(command.frame(counter_)), bit_at(ms), true});
+  }
+
+ private:
+  std::uint64_t bit_at(double ms) const {
+    return static_cast<std::uint64_t>(1e-3 * ms * world_.board.can.bits_per_second);
+  }
+  TruckWorld& world_;
+  std::uint8_t counter_ = 0;
+};
+
+TEST_F(Sleep, ANodeThatSendsInStepWithTheSamplesIsReceivedWithItsSecondFrame) {
+  constexpr double step_ms = 2.5, period_ms = 1'000;
+  Cases cases(processors());
+  for (double phase_ms = 0; phase_ms < 100; phase_ms += step_ms) {
+    cases.start(fmt::format("{} ms after a sample", phase_ms), [&, phase_ms](Outcome& outcome) {
+      const unsigned samples = world_.board.estimates;
+      world_.run_until([&] { return world_.board.estimates != samples; }, 200);
+      NodeInStep node(world_);
+      const double first_ms = world_.now_ms() + phase_ms;
+      for (int k = 0; k < 4; ++k) node.send_at(first_ms + k * period_ms);
+      world_.run_ms(phase_ms);
+      const double ms = sample_after_ms(2.5 * period_ms);
+      outcome.values["received"] = ms;
+      if (ms < 0) outcome.fail("not received");
+      for (const std::string& violation : world_.violations()) outcome.fail(violation);
+    });
+  }
+  double latest_ms = 0;
+  int with_the_first = 0, all = 0;
+  for (const Outcome& o : cases.finish()) {
+    EXPECT_TRUE(o.good) << o.name << ": " << o.why;
+    latest_ms = std::max(latest_ms, o.value("received", -1));
+    with_the_first += o.good && o.value("received", -1) < period_ms ? 1 : 0;
+    ++all;
+  }
+  fmt::print("{} phases, {} received with the first frame, all after {:.0f} ms\n", all, with_the_first, latest_ms);
+  EXPECT_EQ(all, 40);
+  EXPECT_LT(latest_ms, period_ms + 200);
+}
+
 /// Its ready flag stays, and its wake-up timer counts no more: a chip that stopped would be reset for ever.
 TEST_F(Sleep, ADeadCrystalOfTheClockLeavesItAwake) {
   world_.rtc.crystal = false;
@@ -127,7 +184,8 @@ TEST_F(Sleep, ACellThatRunsDownIsFound) {
 
 class SwitchOff : public Sleep {
  protected:
-  SwitchOff() : Sleep(pack_that_switches_off()) {}
+  static constexpr double with_pull_down_ohm = 1 / (1 / 220e3 + 1 / plant::FrontEndInputs{}.ld_ohm);
+  SwitchOff() : Sleep(pack_that_switches_off(), with_pull_down_ohm) { world_.chip.ld_high_v = 0.8; }
 };
 
 TEST_F(SwitchOff, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
@@ -153,6 +211,45 @@ TEST_F(SwitchOff, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
   world_.vehicle.request = Request::charge;
   EXPECT_GE(world_.run_until([&] { return world_.closed(Relay::charge); }, start_limit_ms), 0) << "it can be charged";
 }
+
+/// The DC link of the last drive is at LD: with the command, the front end would wait with its outputs off.
+class SwitchOffAfterADrive : public SwitchOff {
+ protected:
+  SwitchOffAfterADrive() {
+    world_.key_on = true;
+    world_.silence_bus(false);
+    EXPECT_EQ(bring_to(world_, pack_, Operating::standby), "");
+    EXPECT_GE(key_off(world_), 0);
+    world_.key_on = false;
+    world_.hold_cell(7, 2.89);
+    world_.run_ms(1'000);
+    world_.silence_bus(true);
+    world_.run_ms(90'000);
+    EXPECT_FALSE(world_.off());
+    EXPECT_FALSE(world_.chip.in_soft_shutdown());
+    EXPECT_GT(world_.truck.pins().ld_v, 2);
+  }
+  void drives_after(double parked_ms) {
+    world_.run_ms(parked_ms);
+    world_.hold_cell(7, 3.28);
+    world_.run_ms(1'000);
+    world_.key_on = true;
+    world_.silence_bus(false);
+    EXPECT_EQ(bring_to(world_, pack_, Operating::standby), "");
+    EXPECT_FALSE(world_.vehicle.faults_seen() >> second_line_failed & 1) << fault_names(world_.vehicle.faults_seen());
+  }
+  static constexpr unsigned second_line_failed = 33;
+};
+
+TEST_F(SwitchOffAfterADrive, WaitsForAnEmptyDcLink) {
+  const double ms = world_.run_until([&] { return world_.off() || world_.chip.in_soft_shutdown(); }, 900'000);
+  fmt::print("off after {:.0f} s more, LD at {:.2f} V\n", 1e-3 * ms, world_.truck.pins().ld_v);
+  ASSERT_GE(ms, 0);
+  EXPECT_TRUE(world_.off());
+  drives_after(5'000);
+}
+
+TEST_F(SwitchOffAfterADrive, DoesNotHappenIfTheKeyIsTurnedBefore) { drives_after(0); }
 
 /// Between the threshold of the detector and that of the reset.
 TEST_F(Sleep, ALowSupplyIsNotMissed) {

@@ -102,6 +102,7 @@ void Vehicle::publish(std::uint64_t faults, double at_ms) {
 
 void Vehicle::read(const can::Frame& frame, double at_ms) {
   ++frames[frame.id & 0x7FF];
+  if (on_frame) on_frame(frame);
   switch (frame.id) {
     case faults_id:
       received_ms_ = at_ms;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -22,6 +23,7 @@ class Vehicle {
 
   Request request = Request::none;
   bool talks = true;
+  std::function<void(const can::Frame&)> on_frame;  ///< each frame of the board, for other nodes
   void clear_faults(bool service = false);
 
   // what the board has published last

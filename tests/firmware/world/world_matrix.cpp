@@ -1,6 +1,6 @@
 // Runs the flashed image of the forklift board in the circuit of a truck: ./bms world [SCENARIO] [OPTIONS]
 //
-//   SCENARIO         starts, contacts, dips, faults, overloads, shift or month; all if not given
+//   SCENARIO         starts, contacts, dips, faults, overloads, shift, charges or month; all if not given
 //   --count N        so many worlds or cases instead of all
 //   --seed N         of the random worlds
 //   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
@@ -41,7 +41,7 @@ struct Scenario {
 constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run_contact_failures},
                                   {"dips", run_supply_dips},    {"faults", run_fault_matrix},
                                   {"overloads", run_overloads}, {"shift", run_shift},
-                                  {"month", run_month}};
+                                  {"charges", run_charges},     {"month", run_month}};
 
 struct Options {
   Extent extent;

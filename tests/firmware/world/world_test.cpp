@@ -42,6 +42,9 @@ TEST(World, ProtectionsActOnPhysicalCauses) {
 
 TEST(World, AShiftWithNoiseHasNoFault) { expect_good(run_shift({.only = "", .minutes = 3, .at_once = 2})); }
 
+/// And not after it, while the charger goes on to ask.
+TEST(World, ChargersOfBothProtocolsChargeUntilAStop) { expect_good(run_charges({.only = "a stop", .at_once = 2})); }
+
 TEST(World, AnOrdinaryDayNeedsNoWorkshop) { expect_good(run_month({.count = 2, .only = "", .days = 1, .at_once = 2})); }
 
 /// Between deep discharge (1.5 V) and cell undervoltage severe (1.8 V): C/20 after a clear command.
