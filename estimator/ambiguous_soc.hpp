@@ -38,8 +38,9 @@ class AmbiguousSoc {
   using Fraction = arithmetic::Fraction<S>;
 
  public:
-  /// Difference of misfits from which the bank's best hypothesis replaces the state of the filter: e to 1.
-  static constexpr double replaces_above = 1;
+  /// Probability that the SOC is elsewhere (SocBank::apart_soc), from which the bank replaces the state of the filter.
+  /// The misfit of the best hypothesis alone would not do: a given start has one place, the others share theirs.
+  static constexpr double replaces_above = 0.5;
   /// The bank watches until all SOCs this far away have a misfit of that much more: e^9 to 1.
   static constexpr double watches_beyond = 0.1, closes_above = 9;
 
@@ -111,7 +112,7 @@ class AmbiguousSoc {
     deviation_v2_ = Variance(
         deviation_v2_ - arithmetic::product<Variance>(deviation_v2_, SocBank<S>::decay_in(constants.bank_share())));
     const Soc moved = Soc(soc + result.moved);
-    if (in_background_ && !(bank_.misfit_at(soc, moved) > arithmetic::Current<S>(replaces_above))) {
+    if (in_background_ && !(result.elsewhere > Fraction(replaces_above))) {
       close_if_decided(soc, moved);
       bank_.follow(Soc(-result.moved));
       return BankEvent::none;

@@ -41,9 +41,10 @@ class SocBank {
 
  public:
   static constexpr int points = 64;
-  static constexpr double max_share = 1.9;            ///< largest `share` of step()
-  static constexpr double close_below_sigma = 0.025;  ///< sigma below which a line through the curve is as good
-  static constexpr double open_above_sigma = 0.03;    ///< sigma above which it is not
+  static constexpr double max_share = 1.9;                    ///< largest `share` of step()
+  static constexpr double close_below_sigma = 0.025;          ///< sigma below which a line through the curve is as good
+  static constexpr double open_above_sigma = 0.03;            ///< sigma above which it is not
+  static constexpr double apart_soc = 2 * close_below_sigma;  ///< what two sigma of that line do not cover
 
   constexpr bool open() const { return open_; }
   constexpr void close() { open_ = false; }
@@ -81,6 +82,7 @@ class SocBank {
     bool ready = false;
     Soc moved{};  ///< change of the mean
     Variance variance{};
+    Fraction elsewhere{};  ///< probability that the SOC is more than apart_soc from that of the filter
   };
 
   /// One sample. soc: of the filter, the mean plus the charge counted since; share: correlation times that pass in
@@ -111,6 +113,7 @@ class SocBank {
     const Fraction step(1.0 / points);
     const Variance finest = Variance(Variance(step * step) * Fraction(1.0 / 12));
     BankUpdate bank_update{true, Soc(mean - mean_), Variance(arithmetic::ratio<Soc>(second_, weights_) - mean * mean)};
+    bank_update.elsewhere = arithmetic::ratio<Fraction>(elsewhere_, weights_);
     bank_update.variance = bank_update.variance < Variance(0) ? finest : Variance(bank_update.variance + finest);
     mean_ = mean;
     return bank_update;
@@ -119,18 +122,6 @@ class SocBank {
   /// The SOC of the filter was changed by `by` other than by counted charge, or was not moved to
   /// the mean of the last step: then by is minus BankUpdate::moved.
   constexpr void follow(const Soc& by) { mean_ = Soc(mean_ + by); }
-  /// Misfit of the hypothesis next to soc, or of one of its neighbours, above the smallest one; after a step that is
-  /// ready. filter_soc: as in step().
-  constexpr Misfit misfit_at(const Soc& soc, const Soc& filter_soc) const {
-    const Soc on_grid = Soc(soc - (filter_soc - mean_));
-    Misfit least(2'000);
-    for (int k = 0; k < points; ++k) {
-      const Misfit m = misfit_[static_cast<std::size_t>(k)];
-      if (arithmetic::magnitude(Soc(grid(k) - on_grid)) < Soc(2.0 / points) && m < least) least = m;
-    }
-    return Misfit(least - least_);
-  }
-
   /// Whether every hypothesis further than `beyond` from soc has a misfit of `above` more than the smallest one; after
   /// a step that is ready. filter_soc: as in step().
   constexpr bool rules_out_beyond(const Soc& beyond, const Misfit& above, const Soc& soc, const Soc& filter_soc) const {
@@ -198,16 +189,18 @@ class SocBank {
 
   constexpr void accumulate_moments(std::size_t k) {
     if (k == 0) {
-      weights_ = first_ = second_ = Variance{};
+      weights_ = first_ = second_ = elsewhere_ = Variance{};
       least_ = next_least_;
     }
     const Fraction spacing(1.0 / points);
     const Fraction weight =
         (Fraction(1) - arithmetic::step_response<S>(Exponent(Misfit(misfit_[k] - least_)))) * spacing;
-    const Fraction moment = weight * grid(static_cast<int>(k));
+    const Soc at = grid(static_cast<int>(k));
+    const Fraction moment = weight * at;
     weights_ = Variance(weights_ + weight);
     first_ = Variance(first_ + moment);
-    second_ = Variance(second_ + moment * grid(static_cast<int>(k)));
+    second_ = Variance(second_ + moment * at);
+    if (arithmetic::magnitude(Soc(at - mean_)) > Soc(apart_soc)) elsewhere_ = Variance(elsewhere_ + weight);
   }
 
   std::array<Misfit, points> misfit_{};
@@ -216,7 +209,7 @@ class SocBank {
   Variance lasting_v2_{};
   Sum gain_sum_{};
   Misfit least_{}, next_least_{};
-  Variance weights_{}, first_{}, second_{};
+  Variance weights_{}, first_{}, second_{}, elsewhere_{};
   Soc mean_{};
   std::uint8_t turn_ = 0;
   bool open_ = false;

@@ -22,6 +22,7 @@ constexpr double stretch_soc = 0.01, stretch_s = 900;
 constexpr double least_ratio = 0.5, most_ratio = 1.3;
 constexpr int tried_ratios = 161, tried_starts = 241;
 constexpr std::size_t most_stretches = 400;
+constexpr double shared_soc = 0.2;  ///< over which the error of the table and of the resistances changes
 constexpr std::size_t ocv_points = 1'101;
 constexpr double soc_low = -0.05, soc_high = 1.05;
 constexpr double known_to = 0.06;         ///< relative standard deviation
@@ -70,7 +71,8 @@ class Stretches {
     // An extended cell file's mechanisms have no value of their own in a row, but are part of the prediction. That is
     // of the state before this row's voltage corrected it, everything else of the one after.
     const bool predicted = !r_.cell.mechanisms.empty();
-    const double before = k == 0 ? e.soc : r_.track.rows[k - 1].soc + moved_ah / r_.cell.parameters.capacity_ah;
+    const double counted_ah = r_.counted_capacity_ah.value_or(r_.cell.parameters.capacity_ah),
+                 before = k == 0 ? e.soc : r_.track.rows[k - 1].soc + moved_ah / counted_ah;
     const auto at = model::look_up(cell_, predicted ? before : e.soc, interval_);
     const double rested_v = model::OneRc<double>::voltage({}, at, {0, 0});
     const double drop_v = predicted ? e.voltage_predicted_v - rested_v
@@ -129,12 +131,43 @@ std::vector<Stretch> thinned(const std::vector<Stretch>& all) {
   return list;
 }
 
-double chi2_of(const std::vector<Stretch>& list, const Ocv& ocv, double capacity_ah, double soc0) {
+/// What a stretch says beyond the stretches before it. Errors are in units of sigma_v. A part of them comes and goes,
+/// the rest is shared with the stretches nearby: a Kalman filter of that rest, the same for every capacity.
+struct Weight {
+  double decays = 0;     ///< what is left of the shared error since the stretch before
+  double gain = 0;       ///< of the shared error
+  double deviation = 1;  ///< standard deviation of the error less what was expected
+};
+
+std::vector<Weight> weights_of(const std::vector<Stretch>& list, double file_ah) {
+  constexpr double own = 1.0 / 4, shared = 1 - own;  // as in the estimator (persistent_errors.hpp)
+  std::vector<Weight> weights;
+  double known = shared;  // variance of the shared error
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    Weight w;
+    const double moved_ah = k == 0 ? 0 : std::abs(list[k].charge_ah - list[k - 1].charge_ah);
+    w.decays = std::exp(-moved_ah / (shared_soc * file_ah));
+    known = shared + w.decays * w.decays * (known - shared);
+    w.gain = known / (known + own);
+    w.deviation = std::sqrt(known + own);
+    known *= 1 - w.gain;
+    weights.push_back(w);
+  }
+  return weights;
+}
+
+double chi2_of(const std::vector<Stretch>& list, const std::vector<Weight>& weights, const Ocv& ocv, double capacity_ah,
+               double soc0) {
   constexpr double far = 3;  // sigmas from where on a stretch counts linearly: a single odd one does not decide
-  double chi2 = 0;
-  for (const Stretch& s : list) {
-    const double z = std::abs(ocv(soc0 + s.charge_ah / capacity_ah) - s.ocv_v) / s.sigma_v;
+  double chi2 = 0, shared = 0;
+  for (std::size_t k = 0; k < list.size(); ++k) {
+    const Stretch& s = list[k];
+    shared *= weights[k].decays;
+    const double off = (ocv(soc0 + s.charge_ah / capacity_ah) - s.ocv_v) / s.sigma_v - shared,
+                 most = far * weights[k].deviation, z = std::abs(off) / weights[k].deviation,
+                 used = z < far ? off : std::copysign(most, off);
     chi2 += z < far ? z * z : far * (2 * z - far);
+    shared += weights[k].gain * used;
   }
   return chi2;
 }
@@ -156,6 +189,14 @@ double unknown_s(const ReplayResult& r) {
     if ((r.track.rows.flags(k) & unknown) != 0) sum_s += r.recording.time_s[k] - r.recording.time_s[k - 1];
   }
   return sum_s;
+}
+
+/// By how much a current of the log may be off all the time [A]: what the filter found, and how sure it is of that;
+/// else what the cell file allows.
+double offset_a(const ReplayResult& r) {
+  const double allowed_a = r.cell.parameters.noise.current_offset_a;
+  if (!r.soc.current_offset_a) return allowed_a;
+  return std::min(allowed_a, std::hypot(*r.soc.current_offset_a, *r.soc.current_offset_sigma_a));
 }
 
 /// What contradicts most likely.
@@ -183,6 +224,7 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   if (list.size() < 3 || unknown_s(r) > longest_unknown_s) return std::nullopt;
   const Ocv ocv(r.cell);
   const double file_ah = r.cell.parameters.capacity_ah;
+  const std::vector<Weight> weights = weights_of(list, file_ah);
   std::vector<std::pair<double, double>> chi2;  // capacity, -2 ln of its probability
   double best = INFINITY;
   for (int c = 0; c < tried_ratios; ++c) {
@@ -191,7 +233,7 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
     double lowest = INFINITY, sum = 0;
     for (int s = 0; s < tried_starts; ++s) {
       const double soc0 = s / (tried_starts - 1.0);
-      of_start[static_cast<std::size_t>(s)] = chi2_of(list, ocv, ratio * file_ah, soc0);
+      of_start[static_cast<std::size_t>(s)] = chi2_of(list, weights, ocv, ratio * file_ah, soc0);
       lowest = std::min(lowest, of_start[static_cast<std::size_t>(s)]);
     }
     for (const double of : of_start) sum += std::exp((lowest - of) / 2);
@@ -209,16 +251,36 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   }
   mean /= weight;
   const double spread = std::sqrt(std::max(0.0, square / weight - mean * mean));
-  // an offset of the current sensor that the cell file allows
   const auto [lowest, highest] = std::ranges::minmax(list, {}, &Stretch::charge_ah);
   const double counted_ah = highest.charge_ah - lowest.charge_ah,
-               drift_ah = r.cell.parameters.noise.current_offset_a * r.recording.duration_s() / 3'600;
+               drift_ah = offset_a(r) * r.recording.duration_s() / 3'600;
   const double sigma = std::hypot(spread, gain_share * mean, mean * drift_ah / std::max(1e-9, counted_ah));
   if (!std::isfinite(mean) || !std::isfinite(sigma))
     throw std::runtime_error("the capacity is not a finite number, so that there is no answer");
   const bool at_bound = mean - 2 * spread < least_ratio * file_ah || mean + 2 * spread > most_ratio * file_ah;
   if (at_bound || sigma > known_to * mean) return std::nullopt;
   return CapacityEstimate{mean, sigma};
+}
+
+bool count_with_estimated_capacity(ReplayResult& r, const measurement::SampleList& samples,
+                                   const std::optional<measurement::StartingPoint>& start) {
+  if (!capacity_differs(r)) return false;
+  files::CellFile cell = r.cell;
+  cell.parameters.capacity_ah = r.capacity->value_ah;
+  model::Noise& noise = cell.parameters.noise;
+  const double error = r.capacity->std_ah / r.capacity->value_ah;
+  if (noise.errors_are_states) noise.current_gain = std::hypot(noise.current_gain, error);
+  Track by_file = std::exchange(r.track, run_on_host(cell, samples, start, r.scalar, Timing::none));
+  r.track.steps_per_second = by_file.steps_per_second;
+  r.counted_capacity_ah = r.capacity->value_ah;
+  const auto again = estimate_capacity(r);
+  if (!again || std::abs(again->value_ah - r.capacity->value_ah) > differs_sigmas * r.capacity->std_ah) {
+    r.track = std::move(by_file);
+    r.counted_capacity_ah.reset();
+    return false;
+  }
+  evaluate(r);
+  return true;
 }
 
 std::vector<std::string> reasons_of(const ReplayResult& r) {
@@ -242,8 +304,9 @@ std::vector<std::string> reasons_of(const ReplayResult& r) {
   }
   if (capacity_differs(r)) {
     reasons.push_back(
-        fmt::format("The cell holds {:.3g} Ah (standard deviation {:.2g} Ah), not the {:.3g} Ah of its file.",
-                    r.capacity->value_ah, r.capacity->std_ah, r.cell.parameters.capacity_ah));
+        fmt::format("The cell holds {:.3g} Ah (standard deviation {:.2g} Ah), not the {:.3g} Ah of its file{}.",
+                    r.capacity->value_ah, r.capacity->std_ah, r.cell.parameters.capacity_ah,
+                    r.counted_capacity_ah ? "; its charge is counted with that" : ""));
   }
   return reasons;
 }

@@ -19,6 +19,13 @@ namespace bms::replay {
 /// result.prior.
 std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& result);
 
+/// Runs the estimator again with the estimated capacity, if that is another one than the cell file's
+/// (capacity_differs), and evaluates result again. What the second run says of the capacity has to agree with the
+/// first: an estimate that its own count does not confirm is not used. samples, start: as for the first run; result is
+/// evaluated. Returns true if the charge is counted with the estimate now.
+bool count_with_estimated_capacity(ReplayResult& result, const measurement::SampleList& samples,
+                                   const std::optional<measurement::StartingPoint>& start);
+
 /// Returns true if the estimate is another capacity than that of the cell file: by three sigma and 5 %.
 bool capacity_differs(const ReplayResult& result);
 

@@ -20,11 +20,13 @@ namespace {
 constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
 constexpr double last_cut_before_end_s = 1'800;  ///< the last cut still runs for this long
 constexpr double stays_s = 1'800;
+constexpr double least_sigma = 1e-9;  ///< of a quotient
 constexpr double after_knee_s = 1'800, without_knee_s = 4 * 3'600;
 
 /// Errors and standard deviations of one run.
 struct Errors {
   std::vector<double> time_s, error, sigma;  ///< time from the cut
+  std::vector<std::size_t> row;              ///< of the recording
 };
 
 Errors errors_of(const measurement::Recording& r, std::size_t first, const Estimates& rows) {
@@ -36,13 +38,15 @@ Errors errors_of(const measurement::Recording& r, std::size_t first, const Estim
     const EstimateRow row = rows[k];
     e.error.push_back(row.soc - reference);
     e.sigma.push_back(row.soc_sigma);
+    e.row.push_back(first + k);
   }
   return e;
 }
 
 std::vector<double> ratios(const Errors& e) {
   std::vector<double> ratio;
-  for (std::size_t k = 0; k < e.error.size(); ++k) ratio.push_back(std::abs(e.error[k]) / std::max(e.sigma[k], 1e-9));
+  for (std::size_t k = 0; k < e.error.size(); ++k)
+    ratio.push_back(std::abs(e.error[k]) / std::max(e.sigma[k], least_sigma));
   return ratio;
 }
 
@@ -227,7 +231,14 @@ CutResult run_cuts(const files::CellFile& cell, const measurement::Recording& re
   std::thread second(work);
   work();
   second.join();
-  for (std::size_t s = 0; s < cut_starts.size(); ++s) sum_up(result.starts[s], errors[s]);
+  for (std::size_t s = 0; s < cut_starts.size(); ++s) {
+    sum_up(result.starts[s], errors[s]);
+    for (const Errors& e : errors[s]) {
+      for (std::size_t k = 0; k < e.row.size(); ++k)
+        add_to_groups(result.starts[s].calibration, recording, e.row[k], e.time_s[k], e.error[k],
+                      std::max(e.sigma[k], least_sigma), cell.parameters.capacity_ah);
+    }
+  }
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "replay/cut_calibration.hpp"
 #include "replay/replay.hpp"
 
 namespace bms::replay {
@@ -66,6 +67,7 @@ struct CutFigures {
   /// Share of the runs that are inside two sigma again within half an hour of the first knee or four hours of the
   /// cut. A run that ends before both, and is not, does not count.
   double recovered = 0;
+  Calibrations calibration{};  ///< of all rows of all runs
 };
 
 struct CutResult {

@@ -145,12 +145,27 @@ double open_loop_start(const ReplayResult& result) {
   return result.prior ? result.initial_soc : result.initial_soc - shift;
 }
 
+/// What the filter has found of the sensor's offset, at the end; nothing else.
+SocFigures offset_figures(const ReplayResult& result) {
+  SocFigures figures;
+  if (!result.cell.parameters.noise.errors_are_states) return figures;
+  const std::size_t last = result.track.rows.size() - 1;
+  figures.current_offset_a = result.track.state(last, current_offset_at);
+  figures.current_offset_sigma_a = result.track.state(last, current_offset_sigma_at);
+  return figures;
+}
+
 SocFigures soc_figures(const ReplayResult& result) {
   const measurement::Recording& r = result.recording;
   const Estimates& rows = result.track.rows;
   identification::ErrorFigure all, later;
   std::size_t inside = 0;
-  const bool reference = !r.soc_ref.empty() && !(result.soc_column && result.soc_column->contradicts());
+  // a column that counts with another capacity says nothing of a count with the cell's own
+  const bool other_count = result.counted_capacity_ah && result.soc_column &&
+                           std::ranges::any_of(result.soc_column->events, [](const measurement::SocEvent& e) {
+                             return e.fault == measurement::SocFault::capacity;
+                           });
+  const bool reference = !r.soc_ref.empty() && !other_count && !(result.soc_column && result.soc_column->contradicts());
   for (std::size_t k = 0; k < rows.size() && reference; ++k) {
     if (std::isnan(r.soc_ref[k])) continue;
     const EstimateRow e = rows[k];
@@ -159,13 +174,9 @@ SocFigures soc_figures(const ReplayResult& result) {
     if (r.time_s[k] - r.time_s.front() >= thirty_minutes_s) later.add(error);
     if (std::abs(error) <= 2 * e.soc_sigma) ++inside;
   }
-  SocFigures figures;
+  SocFigures figures = offset_figures(result);
   figures.final = rows.back().soc;
   figures.final_sigma = rows.back().soc_sigma;
-  if (result.cell.parameters.noise.errors_are_states) {
-    figures.current_offset_a = result.track.state(rows.size() - 1, current_offset_at);
-    figures.current_offset_sigma_a = result.track.state(rows.size() - 1, current_offset_sigma_at);
-  }
   if (all.count() > 0) {
     figures.rmse = all.rms();
     figures.max_error = all.max();
@@ -208,16 +219,20 @@ void evaluate(ReplayResult& result) {
   const measurement::Recording& r = result.recording;
   if (!result.prior) result.initial_soc = result.track.rows.front().soc;
   const auto cell = model::prepare<double, model::max_intervals>(result.cell.parameters);
+  result.open_loop_v.clear();
   result.open_loop_v.reserve(r.rows());
   simulate({.cell = cell,
-            .capacity_ah = result.cell.parameters.capacity_ah,
+            .capacity_ah = result.counted_capacity_ah.value_or(result.cell.parameters.capacity_ah),
             .mechanisms = result.cell.mechanisms,
             .time_s = r.time_s,
             .current_a = r.current_a,
             .temperature_c = r.temperature_c,
             .initial_soc = open_loop_start(result)},
            [&](const SimulatedRow& row) { result.open_loop_v.push_back(row.voltage_v); });
-  result.capacity = estimate_capacity(result);
+  if (!result.counted_capacity_ah) {
+    result.soc = offset_figures(result);
+    result.capacity = estimate_capacity(result);
+  }
   // a count with the file's capacity is wrong if the cell has another one
   const double capacity_ah = capacity_differs(result) ? result.capacity->value_ah : result.cell.parameters.capacity_ah;
   result.soc_column = measurement::own_soc_column(r, capacity_ah);

@@ -149,6 +149,7 @@ struct ReplayResult {
   std::size_t run = 0, runs = 0;                     ///< of a CAN log: which run of the firmware, and their number
   std::optional<measurement::SocColumn> soc_column;  ///< nothing: the log has none, or a reference instrument's
   std::optional<CapacityEstimate> capacity;          ///< nothing: not determined by the log
+  std::optional<double> counted_capacity_ah;         ///< by which the charge is counted; nothing: by the cell file's
   std::vector<std::string> reasons;                  ///< sentences for the flags of the estimator
   std::vector<std::string> doubts;  ///< why the estimates are not reliable (host_sim/replay/judgement.hpp)
 };

@@ -28,6 +28,7 @@ std::string json_of(const replay::ReplayResult& r, const std::string& trace_sha2
   json["soc_column"] = soc_column_of(r.soc_column);
   json["capacity"] =
       r.capacity ? Json({{"value_ah", r.capacity->value_ah}, {"std_ah", r.capacity->std_ah}}) : Json(nullptr);
+  json["counted_capacity_ah"] = optional(r.counted_capacity_ah);
   json["reasons"] = r.reasons;
   json["reliable"] = r.doubts.empty();
   json["doubts"] = r.doubts;

@@ -10,6 +10,7 @@
 #include "images/firmware_image.hpp"
 #include "measurement/recording_checks.hpp"
 #include "replay/can_log.hpp"
+#include "replay/capacity_estimate.hpp"
 #include "replay/cuts.hpp"
 #include "replay/judgement.hpp"
 #include "replay/replay.hpp"
@@ -204,6 +205,10 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
   if (!run.log)
     result.open_loop_soc = workflow::recording_start(result.recording, result.cell, options.initial_soc).start.soc;
   replay::evaluate(result);
+  // a board counts with the capacity that it has
+  if (run.board == nullptr && !run.log &&
+      replay::count_with_estimated_capacity(result, measurement::SampleList(result.recording), run.start))
+    judge(options, result);
   if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
 }
 

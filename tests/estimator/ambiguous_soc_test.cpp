@@ -66,6 +66,20 @@ TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
   EXPECT_NEAR(r.state.charge.soc(r.cell.charge), 0.05, 0.02);
 }
 
+/// The place of the filter is the most probable one, but not as probable as all others together.
+TEST(AmbiguousSoc, TakesOverFromTheFilterWhenTheSocIsMoreProbablyElsewhere) {
+  const auto takes_over = [](double others) {
+    Restart r(0.5);
+    const auto misfit = [&](double soc, double, std::uint8_t&) { return std::abs(soc - 0.5) < 0.05 ? 0 : others; };
+    r.ambiguous.open_at(0.5, misfit, true, 100);  // the model was off by volts: no voltage says anything
+    for (int k = 0; k < 128; ++k) r.second(0.5);
+    return !r.ambiguous.in_background();
+  };
+  EXPECT_TRUE(takes_over(0.5));
+  EXPECT_TRUE(takes_over(2.0)) << "58 e^-2 = 7.8, and 6 at the filter's place";
+  EXPECT_FALSE(takes_over(2.5)) << "58 e^-2.5 = 4.8";
+}
+
 TEST(AmbiguousSoc, TheModelsErrorAndTheStatesThatAreNotCorrectedPersist) {
   const Restart r(0.5);
   EXPECT_DOUBLE_EQ((AmbiguousSoc<double, Model>::persistent_variance(r.cell.noise, r.state, {2, 1})),

@@ -53,6 +53,29 @@ TYPED_TEST(SocBankOfEveryScalar, IsUniformAtFirst) {
   EXPECT_NEAR(a.variance, 1.0 / 12, 0.002);
 }
 
+TYPED_TEST(SocBankOfEveryScalar, SaysHowProbablyTheSocIsElsewhere) {
+  using S = TypeParam;
+  const auto elsewhere = [](double others, double moved) {
+    SocBank<S> bank;
+    bank.open_at(arithmetic::Soc<S>(0.5), [&](const arithmetic::Soc<S>& there) {
+      return arithmetic::Exponent<S>(std::abs(arithmetic::as_double(there) - 0.5) < 0.05 ? 0 : others);
+    });
+    bank.follow(arithmetic::Soc<S>(moved));
+    double probability = -1;
+    for (int k = 0; k < 128; ++k) {
+      const auto update = bank.step(arithmetic::Soc<S>(0.5 + moved), arithmetic::Fraction<S>(1),
+                                    arithmetic::Variance<S>(1e-6), arithmetic::Variance<S>(1e-4),
+                                    [](const arithmetic::Soc<S>&) -> typename SocBank<S>::Observation { return {}; });
+      if (update.ready) probability = arithmetic::as_double(update.elsewhere);
+    }
+    return probability;
+  };
+  EXPECT_NEAR(elsewhere(0, 0), 58.0 / 64, 0.01);
+  EXPECT_NEAR(elsewhere(2, 0), 58 * std::exp(-2.0) / (6 + 58 * std::exp(-2.0)), 0.01);
+  EXPECT_NEAR(elsewhere(20, 0), 0, 0.001);
+  EXPECT_NEAR(elsewhere(20, 0.2), 1, 0.001) << "the filter has left the only place that fits";
+}
+
 TYPED_TEST(SocBankOfEveryScalar, OnAPlateauItIsAsWideAsThePlateau) {
   auto a = asked<TypeParam>();
   for (int k = 0; k < 128 * 40; ++k) a.sample(0.3, 0, 0.2, 0.01);

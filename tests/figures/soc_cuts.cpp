@@ -97,14 +97,16 @@ int run(const Options& options) {
     fmt::print(stderr, "soc_cuts: no recording, expected {} or another name\n", data.string());
     return 2;
   }
-  const std::string summary = replay::cut_summary(results), better = replay::cut_summary(by_last_rest);
+  const std::string summary = replay::cut_summary(results), better = replay::cut_summary(by_last_rest),
+                    calibration = replay::calibration_table(by_last_rest);
   if (options.write) {
     const auto page = source / "docs/figures/soc_trials.md";
     files::replace_figures(page, "cuts", table);
     files::replace_figures(page, "all cuts", summary);
     files::replace_figures(page, "all cuts by last rest", better);
+    files::replace_figures(page, "calibration", calibration);
   } else {
-    fmt::print("\n{}\nby the last rest:\n{}", summary, better);
+    fmt::print("\n{}\nby the last rest:\n{}\n{}", summary, better, calibration);
   }
   return 0;
 }

@@ -8,6 +8,7 @@
 
 #include "files/bad_input.hpp"
 #include "files/recording.hpp"
+#include "measurement/normal_distribution.hpp"
 
 namespace bms::replay {
 namespace {
@@ -74,6 +75,54 @@ TEST(Cuts, OfTwoRecordingsCountOnceEachInTheSummary) {
   CutResult other = one;
   for (CutFigures& starts : other.starts) starts.runs.resize(1);
   EXPECT_THAT(cut_summary({one, other}), HasSubstr("| unknown | 3 | 0.00, 0.00, 0.00 | 60, 73, 80 | 2, 2 | 2.00 |"));
+}
+
+/// Errors drawn from a normal distribution, in quantiles.
+Calibration of_normal_errors(double sigma, double stated, double bias) {
+  Calibration c;
+  constexpr int draws = 1'000;
+  for (int k = 0; k < draws; ++k) c.add(bias + sigma * measurement::normal_quantile((k + 0.5) / draws), stated);
+  return c;
+}
+
+TEST(CutCalibration, HasAQuarterInEachQuarterIfSigmaIsHonest) {
+  const Calibration honest = of_normal_errors(0.02, 0.02, 0), wide = of_normal_errors(0.01, 0.02, 0),
+                    small = of_normal_errors(0.04, 0.02, 0), high = of_normal_errors(0.02, 0.02, 0.02);
+  for (const double quarter : honest.quarters) EXPECT_NEAR(quarter, 250, 1);
+  EXPECT_NEAR(honest.within_2_sigma, 954, 1);
+  EXPECT_NEAR(wide.quarters[0], 89, 1) << "beyond 0.674 of a sigma that is twice the error's";
+  EXPECT_NEAR(wide.quarters[1], 411, 1);
+  EXPECT_NEAR(small.quarters[3], 368, 1);
+  EXPECT_NEAR(small.within_2_sigma, 683, 1);
+  EXPECT_NEAR(high.quarters[0], 628, 1) << "the truth lies below what is stated";
+  EXPECT_NEAR(high.quarters[3], 47, 1);
+}
+
+TEST(CutCalibration, GroupsEachEstimateByTimeTemperatureAndCurrent) {
+  auto recording = files::read_recording(BMS_SOURCE_DIR "/evidence/recordings/forklift_shift.csv");
+  const CutResult result = run_cuts(files::read_cell("table9"), recording, 2);
+  for (const CutFigures& f : result.starts) {
+    const double rows = static_cast<double>(f.runs[0].rows + f.runs[1].rows);
+    std::size_t first = 0;
+    for (const std::size_t groups :
+         {calibration_from_min.size(), calibration_from_c.size(), calibration_from_c_rate.size()}) {
+      double sum = 0;
+      for (std::size_t k = first; k < first + groups; ++k) sum += f.calibration[k].count();
+      EXPECT_EQ(sum, rows) << f.start.title << ", groups from " << first;
+      first += groups;
+    }
+    EXPECT_EQ(f.calibration[0].count(), 2 * 600) << "ten minutes of two cuts at 1 Hz";
+    EXPECT_EQ(f.calibration[calibration_from_min.size() + 0].count(), 0) << "below 0 degrees C";
+  }
+  // each recording counts once, however long it is
+  CutResult other = result;
+  const std::size_t drawn = 1;
+  ASSERT_STREQ(other.starts[drawn].start.id, "drawn");
+  other.starts[drawn].calibration[0] = {{4, 0, 0, 0}, 0};
+  CutResult longer = result;
+  longer.starts[drawn].calibration[0] = {{0, 1'000, 0, 1'000}, 2'000};
+  const std::vector<CutResult> both{other, longer};
+  EXPECT_THAT(calibration_table(both), HasSubstr("| below 10 min since the start | 50, 25, 0, 25 | 50 |"));
 }
 
 TEST(Cuts, NeedAReference) {
