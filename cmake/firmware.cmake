@@ -102,7 +102,7 @@ foreach(value ${of_pack_and_truck})
 endforeach()
 if(NOT BMS_CELLS MATCHES "^[0-9]+$" OR BMS_CELLS LESS BMS_FEWEST_CELLS OR BMS_CELLS GREATER BMS_MOST_CELLS)
   message(FATAL_ERROR "BMS_CELLS is ${BMS_CELLS}, but the board ${BMS_BOARD} measures from ${BMS_FEWEST_CELLS} to "
-    "${BMS_MOST_CELLS} cells in series. More than 16 cells need two monitoring chips: docs/packs_of_24_cells.md")
+    "${BMS_MOST_CELLS} cells in series. More than 16 cells need two monitoring chips: boards/stm32f405_80v")
 endif()
 include(${root}/hal/${BMS_CHIP}/chip.cmake)  # compiler flags, core, flash, what QEMU replaces
 if(NOT BMS_CELL)
@@ -279,6 +279,16 @@ set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/
   ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
   ${chip}/i2c.cpp ${chip}/sleep.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp
   ${auxiliary_contacts} ${second_current} ${truck_pins} ${insulation})
+# More than 16 cells have two chips, each on a bus of its own.
+set(isolated_bus "")
+if(BMS_SAMPLES STREQUAL "bq76952" AND BMS_CELLS GREATER 16)
+  list(APPEND samples_bq76952 ${hal}/bq76952/stack.cpp ${root}/firmware/front_end/upper_settings.cpp)
+  set(isolated_bus hal_isolated_bus)
+  bms_shared_objects(hal_isolated_bus -Os ${chip}/i2c.cpp)
+  if(NOT BMS_SHARED_OBJECTS)
+    target_compile_definitions(hal_isolated_bus PRIVATE BMS_ISOLATED_BUS)
+  endif()
+endif()
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
@@ -378,7 +388,7 @@ set(on_chip hal_core hal_clock hal_chip hal_board)
 set(program estimator_step storage application)
 set(portable ${program} ${image_kind})
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${portable} ${of_a_slot})
+  bms_image(bms_${BMS_BOARD} ${on_chip} hal_samples ${isolated_bus} ${portable} ${of_a_slot})
   bms_image(bms_${BMS_BOARD}_remote ${on_chip} hal_remote_samples ${portable} ${of_a_slot})
   if(BMS_SLOT)
     return()

@@ -18,9 +18,26 @@ std::uint32_t second_line_trips();
 /// Ends a short circuit that the chip has latched. Call it when protection has ended its fault, with open contactors.
 void second_line_clear();
 
-enum class FrontEndState : std::uint8_t { absent, configuring, measuring };
+/// The first three are those of one chip, or of both halves of a pack of more than 16 cells. The others name the half
+/// of such a pack that has no readings, the lower half before the upper one.
+enum class FrontEndState : std::uint8_t {
+  absent,
+  configuring,
+  measuring,
+  lower_absent,
+  upper_absent,
+  lower_configuring,
+  upper_configuring,
+  swapped,          ///< the two buses are exchanged
+  lower_misplaced,  ///< what answers on the bus of the lower half is not wired as the lower chip
+  upper_misplaced,
+  lower_clock_wrong,  ///< the chip's clock differs from that of this core
+  upper_clock_wrong,
+  lower_stale,  ///< the chip answers, but has not measured
+  upper_stale,
+};
 
-/// State of the measuring chip and counters since boot; they wrap.
+/// State of the measuring chips and counters since boot, of both together; they wrap.
 struct FrontEndHealth {
   FrontEndState state = FrontEndState::absent;
   std::uint32_t lost = 0;    ///< times that measuring ended

@@ -52,7 +52,7 @@ constexpr const protection::Rule& rule_of(const protection::Rules& rules, protec
   return rules[static_cast<std::size_t>(fault)];
 }
 
-/// Board around the chip for this pack. rules: those of its table.
+/// Board around the chip for this pack, the lower one of two. rules: those of its table.
 constexpr hal::bq76952::Board front_end_board(const protection::PackDesign& pack, const protection::Rules& rules) {
   using enum protection::Fault;
   const protection::Rule &high = rule_of(rules, cell_overvoltage_severe),
@@ -60,7 +60,8 @@ constexpr hal::bq76952::Board front_end_board(const protection::PackDesign& pack
   const double short_a = 1e-6 * rule_of(rules, short_circuit).threshold;
   const auto celsius = [&](protection::Fault fault) { return rule_of(rules, fault).threshold / 100; };
   return {.current_range_a = std::max(327.0, range_ratio * short_a),
-          .cell_inputs = hal::bq76952::inputs_of_pack(pack.cells),
+          .cell_inputs = hal::bq76952::inputs_of_pack(hal::bq76952::lower_cells(pack.cells)),
+          .four_thermistors = pack.cells <= hal::bq76952::cell_inputs,
           .overvoltage_v = 1e-6 * high.threshold + voltage_margin_v,
           .undervoltage_v = 1e-6 * rule_of(rules, deep_discharge).threshold - voltage_margin_v,
           .voltage_delay_s = 1e-6 * std::max(high.delay_us, low.delay_us) + slower_by_s,

@@ -26,12 +26,16 @@ constexpr std::uint16_t inputs_of_pack(std::size_t cells) {
   return static_cast<std::uint16_t>(((1U << (cells - 1)) - 1) | 1U << (cell_inputs - 1));
 }
 
+/// Cells of the chip at the negative end: all, or the larger half of a pack of more than 16 cells, which has two chips.
+constexpr std::size_t lower_cells(std::size_t cells) { return cells > cell_inputs ? (cells + 1) / 2 : cells; }
+
 /// Components around the chip, and thresholds of its own protections. A threshold is rounded away from the normal range
 /// to the next step of the chip.
 struct Board {
   double shunt_mohm = 0.1;
   double current_range_a = 327;               ///< a sample must be able to state this current: current_end_a()
   std::uint16_t cell_inputs = 0xFFFF;         ///< one bit per connected input
+  bool four_thermistors = true;               ///< false: at TS1 and TS3 only
   double overvoltage_v, undervoltage_v;       ///< of a cell; steps of 50.6 mV
   double voltage_delay_s;                     ///< 0.01 to 6.7
   double overcurrent_a, overcurrent_delay_s;  ///< both directions; steps of 2 mV at the shunt; 0.01 to 0.425 s
@@ -118,6 +122,7 @@ constexpr auto settings(const Board& b) {
   const auto charge_steps = std::min(shunt_steps(b, b.overcurrent_a), most_charge_steps),
              discharge_steps = std::min(shunt_steps(b, b.overcurrent_a), most_discharge_steps),
              high_steps = std::min(shunt_steps(b, b.high_overcurrent_a), most_discharge_steps);
+  const std::uint32_t further = b.four_thermistors ? 0x07 : 0x00;
   constexpr std::uint16_t rest_ma = 1'000, minus_rest_ma = 0xFC18;
   return std::array{
       Setting{0x91A8, 4, floating(cc_gain)},                 // CC Gain
@@ -162,11 +167,11 @@ constexpr auto settings(const Board& b) {
       Setting{0x92A8, 1, byte_of(b.charge_cold_c + temperature_hysteresis_c)},
       Setting{0x92AF, 1, 3},                 // Recovery Time [s]: the firmware has opened its outputs long before
       Setting{0x92B2, 2, b.host_silence_s},  // HWD Delay
-      Setting{0x92FA, 1, 0x07},              // CFETOFF Pin Config: cell thermistor, 18 kohm pull-up
+      Setting{0x92FA, 1, further},           // CFETOFF Pin Config: cell thermistor, 18 kohm pull-up
       Setting{0x92FC, 1, 0x2A},              // ALERT Pin Config: alert, drives high from REG1
       Setting{0x92FD, 1, 0x07},              // TS1 Config
       Setting{0x92FF, 1, 0x07},              // TS3 Config; TS2 is the wake-up pin from SHUTDOWN
-      Setting{0x9300, 1, 0x07},              // HDQ Pin Config
+      Setting{0x9300, 1, further},           // HDQ Pin Config
       Setting{0x9301, 1, 0xAA},              // DCHG Pin Config: low forbids charging, high from REG1
       Setting{0x9302, 1, 0xAA},              // DDSG Pin Config: low forbids discharging
       Setting{0x9303, 1, current_step_ua(b) == 10'000 ? 0x06U : 0x07U},  // DA Configuration: userA, userV 10 mV
@@ -231,5 +236,8 @@ constexpr Configuration configuration(const Board& b, std::span<const Setting> s
 
 /// Of this image: firmware/front_end/settings.cpp.
 extern const Configuration board_configuration;
+/// Of the upper chip of a pack of more than 16 cells: firmware/front_end/upper_settings.cpp. board_configuration is
+/// then that of the lower one.
+extern const Configuration upper_configuration;
 
 }  // namespace bms::hal::bq76952

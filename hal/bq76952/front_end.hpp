@@ -30,6 +30,7 @@
 #include "hal/bq76952/mean_current.hpp"
 #include "hal/bq76952/registers.hpp"
 #include "hal/bq76952/wire.hpp"
+#include "hal/bytes.hpp"
 #include "measurement/pack_sample.hpp"
 
 namespace bms::hal::bq76952 {
@@ -56,6 +57,10 @@ class FrontEnd {
 
   /// configuration: must outlive this object.
   constexpr void use(const Configuration& configuration) { configuration_ = &configuration; }
+  constexpr void use(const Configuration& configuration, const Bus& bus) {
+    use(configuration);
+    wire_.bus = bus;
+  }
 
   /// Call once per sample, with into.time_us set. Writes the fresh readings, cells at the place of their input; all
   /// other fields are no_reading.
@@ -80,6 +85,15 @@ class FrontEnd {
 
   /// DC link of the last read() [uV], or no_reading.
   std::int32_t dc_link_uv() const { return dc_link_uv_; }
+  /// PACK pin of the last read() against VSS [uV], or no_reading; measured with the DC link.
+  std::int32_t strap_uv() const {
+    if (dc_link_uv_ == measurement::no_reading) return measurement::no_reading;
+    return get_bytes<std::int16_t>(voltages_, pack_voltage - first_cell) * voltage_step_uv;
+  }
+  /// Returns true if the chip has measured its cells between the last two calls of read().
+  bool fresh() const { return fresh_; }
+  /// Seconds of the chip's charge counter.
+  std::uint32_t charge_time_s() const { return charge_time_s_; }
   State state() const { return state_; }
   const Counters& counters() const { return counters_; }
   const WireCounters& wire() const { return wire_.counters(); }

@@ -8,8 +8,12 @@
 // The chip opens main plus when its host is silent and would close it again at the next transfer. So after such a
 // silence the outputs are switched off before that transfer; protection then receives host_silence.
 #include "hal/samples.hpp"
+
+#include <type_traits>
+
 #include "hal/bq76952/front_end.hpp"
 #include "hal/bq76952/pack_readings.hpp"
+#include "hal/bq76952/stack.hpp"
 #include "hal/can.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
@@ -23,9 +27,45 @@ namespace bms::hal {
 
 namespace {
 
+using namespace bq76952;
+
+/// The measuring chain of a pack of at most 16 cells. Stack has the same members for two chips.
+class OneChip {
+ public:
+  /// Configures the bus. Call once, before the first read().
+  void start() {
+    i2c_start();
+    chip_.use(board_configuration);
+  }
+  using Inputs = measurement::PackSample<cell_inputs>;
+  /// Call once per sample, with inputs.time_us set.
+  void read(Inputs& inputs, const SensorCalibration& by, measurement::PackSample<pack_cells>& into) {
+    chip_.read(inputs);
+    read_pack(inputs, board_configuration, by, into);
+  }
+  bool silent() const { return chip_.silent(); }
+  std::uint32_t trips() const { return chip_.trips(); }
+  void clear_latch() { chip_.clear_latch(); }
+  FrontEndHealth health() const {
+    using State = FrontEnd::State;
+    const State state = chip_.state();
+    FrontEndHealth health{FrontEndState::configuring, chip_.counters().lost, chip_.counters().resets,
+                          chip_.wire().bad_crc};
+    if (state == State::absent) health.state = FrontEndState::absent;
+    if (state == State::measure) health.state = FrontEndState::measuring;
+    return health;
+  }
+  void shut_down() { chip_.shut_down(); }
+  /// cells: one bit per cell of the pack.
+  void bleed(std::uint32_t cells) { chip_.bleed(inputs_of(board_configuration, cells)); }
+
+ private:
+  FrontEnd chip_;
+};
+
 constexpr auto period_us = static_cast<std::uint64_t>(1e6 * sample_period_s);
 
-bq76952::FrontEnd front_end;
+std::conditional_t<stacked, Stack, OneChip> front_end;
 measurement::PackSample<pack_cells> sample;
 SensorCalibration correction;
 std::uint64_t due_us = 0;
@@ -41,19 +81,17 @@ void receive_frames() {
 
 const measurement::PackSample<pack_cells>* next_sample() {
   if (!started) {
-    i2c_start();
-    front_end.use(bq76952::board_configuration);
+    front_end.start();
     started = true;
     due_us = now_us() + period_us;
   }
   for (receive_frames(); now_us() < due_us; receive_frames()) rest_until(due_us);
-  measurement::PackSample<bq76952::cell_inputs> inputs;
+  decltype(front_end)::Inputs inputs;
   inputs.time_us = now_us();
   due_us = inputs.time_us - due_us < period_us ? due_us + period_us : inputs.time_us + period_us;
   if (front_end.silent()) [[unlikely]]
     contactor_pins_set({});
-  front_end.read(inputs);
-  bq76952::read_pack(inputs, bq76952::board_configuration, correction, sample);
+  front_end.read(inputs, correction, sample);
   acquired_us = static_cast<std::uint32_t>(now_us() - inputs.time_us);
   return &sample;
 }
@@ -67,15 +105,7 @@ bool calibrate(const SensorCalibration& calibration) {
 
 std::uint32_t second_line_trips() { return front_end.trips(); }
 void second_line_clear() { front_end.clear_latch(); }
-FrontEndHealth front_end_health() {
-  using State = bq76952::FrontEnd::State;
-  const State state = front_end.state();
-  FrontEndHealth health{FrontEndState::configuring, front_end.counters().lost, front_end.counters().resets,
-                        front_end.wire().bad_crc};
-  if (state == State::absent) health.state = FrontEndState::absent;
-  if (state == State::measure) health.state = FrontEndState::measuring;
-  return health;
-}
+FrontEndHealth front_end_health() { return front_end.health(); }
 
 /// With LD above its threshold (0.8 V or more assumed, 1.45 V typical: E2E 1356033) the chip would wait with its
 /// outputs off, and its pins would contradict the protections.
@@ -87,7 +117,7 @@ void switch_off() { front_end.shut_down(); }
 
 void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);
-  front_end.bleed(bq76952::inputs_of(bq76952::board_configuration, wanted.bleed));
+  front_end.bleed(wanted.bleed);
 }
 
 }  // namespace bms::hal

@@ -31,7 +31,7 @@ bool Wire::fail(std::uint32_t& counter) {
 
 bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
   ++counters_.transfers;
-  const I2cResult result = i2c_transfer(i2c_address, out, in);
+  const I2cResult result = bus.transfer(i2c_address, out, in);
   retry_useful_ = result == I2cResult::no_acknowledge;
   switch (result) {
     case I2cResult::done:
@@ -45,7 +45,7 @@ bool Wire::transfer(std::span<const std::uint8_t> out, std::span<std::uint8_t> i
       ++counters_.timed_out;
       break;
   }
-  const bool free = i2c_recover();
+  const bool free = bus.recover();
   retry_useful_ = free && result == I2cResult::bus_stuck;
   return false;
 }

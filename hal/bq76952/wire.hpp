@@ -19,7 +19,7 @@
 #include <cstdint>
 #include <span>
 
-#include "hal/i2c.hpp"
+#include "hal/bq76952/bus.hpp"
 
 namespace bms::hal::bq76952 {
 
@@ -39,6 +39,7 @@ class Wire {
 
   Check check = Check::plain;
   bool by_words = false;
+  [[no_unique_address]] Bus bus;
 
   /// Direct command: reads into.size() bytes, at most most_bytes.
   bool read(std::uint8_t command, std::span<std::uint8_t> into);

@@ -2,6 +2,9 @@
 // Registers and order of events: RM0090, 27.3.3 and 27.6. USART1 of hal/stm32f4/uart.cpp has the same pins, so an image
 // has only one of the two.
 //
+// An image with two buses has this file twice: with BMS_ISOLATED_BUS it is I2C2 on PB10 (SCL) and PB11 (SDA), and the
+// functions are those of hal/isolated_i2c.hpp.
+//
 // The end of a read follows 27.3.3: one byte (acknowledge off before the address flag is cleared), two bytes (POS),
 // more (the last three by BTF). An interrupt between two register accesses may therefore take any time: it makes a
 // transfer longer, not wrong, because the clock waits.
@@ -12,6 +15,7 @@
 #include "hal/i2c.hpp"
 
 #include "hal/clock.hpp"
+#include "hal/isolated_i2c.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
 
@@ -21,7 +25,24 @@ namespace {
 
 using namespace stm32f4;
 
-constexpr std::uint32_t scl = 1U << 6, sda = 1U << 7;
+#ifdef BMS_ISOLATED_BUS
+#define BMS_OF_BUS(function) isolated_##function
+constexpr std::uint32_t controller = 0x40005800, clock_of_controller = 1U << 22, first_pin = 10;
+#else
+#define BMS_OF_BUS(function) function
+constexpr std::uint32_t controller = 0x40005400, clock_of_controller = 1U << 21, first_pin = 6;
+#endif
+Register& i2c_cr1() { return at<controller>(); }
+Register& i2c_cr2() { return at<controller + 0x04>(); }
+Register& i2c_dr() { return at<controller + 0x10>(); }
+Register& i2c_sr1() { return at<controller + 0x14>(); }
+Register& i2c_sr2() { return at<controller + 0x18>(); }
+Register& i2c_ccr() { return at<controller + 0x1C>(); }
+Register& i2c_trise() { return at<controller + 0x20>(); }
+Register& alternate_functions() { return first_pin < 8 ? gpiob_afrl() : gpiob_afrh(); }
+constexpr std::uint32_t two_pins = 2 * first_pin, four_bits = 4 * (first_pin % 8);  // places in MODER and AFR
+
+constexpr std::uint32_t scl = 1U << first_pin, sda = 2U << first_pin;
 constexpr std::uint32_t cr1_on = 1U << 0, cr1_start = 1U << 8, cr1_stop = 1U << 9, cr1_ack = 1U << 10,
                         cr1_pos = 1U << 11, cr1_reset = 1U << 15;
 constexpr std::uint32_t sr1_started = 1U << 0, sr1_address = 1U << 1, sr1_finished = 1U << 2, sr1_received = 1U << 6,
@@ -42,27 +63,27 @@ constexpr Speed speed(std::uint32_t apb1_hz) {
 static_assert(speed(42'000'000).ccr == (1U << 15 | 35) && speed(42'000'000).trise == 13);
 static_assert(speed(16'000'000).ccr == (1U << 15 | 14) && speed(16'000'000).trise == 5);
 
-void set(std::uint32_t bits) { i2c1_cr1() = i2c1_cr1() | bits; }
-void clear(std::uint32_t bits) { i2c1_cr1() = i2c1_cr1() & ~bits; }
+void set(std::uint32_t bits) { i2c_cr1() = i2c_cr1() | bits; }
+void clear(std::uint32_t bits) { i2c_cr1() = i2c_cr1() & ~bits; }
 
 /// Reading SR2 after SR1 clears the address flag, and the clock continues.
 void clear_address() {
-  const std::uint32_t read = i2c1_sr2();
+  const std::uint32_t read = i2c_sr2();
   static_cast<void>(read);
 }
 
 void configure() {
-  i2c1_cr1() = cr1_reset;
-  i2c1_cr1() = 0;
+  i2c_cr1() = cr1_reset;
+  i2c_cr1() = 0;
   const std::uint32_t apb1_hz = clocks().core_hz == crystal_core_hz ? crystal_apb1_hz : clocks().core_hz;
   const Speed s = speed(apb1_hz);
-  i2c1_cr2() = apb1_hz / 1'000'000;
-  i2c1_ccr() = s.ccr;
-  i2c1_trise() = s.trise;
-  i2c1_cr1() = cr1_on;
+  i2c_cr2() = apb1_hz / 1'000'000;
+  i2c_ccr() = s.ccr;
+  i2c_trise() = s.trise;
+  i2c_cr1() = cr1_on;
 }
 
-void pins(std::uint32_t mode) { gpiob_moder() = (gpiob_moder() & ~(15U << 12)) | (mode | mode << 2) << 12; }
+void pins(std::uint32_t mode) { gpiob_moder() = (gpiob_moder() & ~(15U << two_pins)) | (mode | mode << 2) << two_pins; }
 
 bool both_high() { return (gpiob_idr() & (scl | sda)) == (scl | sda); }
 
@@ -82,7 +103,7 @@ class Transfer {
     clear_address();
     for (const std::uint8_t byte : out) {
       if (const auto r = wait(sr1_empty); r != I2cResult::done) return r;
-      i2c1_dr() = byte;
+      i2c_dr() = byte;
     }
     return out.empty() ? I2cResult::done : wait(sr1_finished);
   }
@@ -103,29 +124,29 @@ class Transfer {
       clear(cr1_ack);
       if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
       set(cr1_stop);
-      in[at++] = static_cast<std::uint8_t>(i2c1_dr());
+      in[at++] = static_cast<std::uint8_t>(i2c_dr());
     } else {
       clear_address();
       for (; at + 3 < in.size(); ++at) {
         if (const auto r = wait(sr1_received); r != I2cResult::done) return r;
-        in[at] = static_cast<std::uint8_t>(i2c1_dr());
+        in[at] = static_cast<std::uint8_t>(i2c_dr());
       }
       // Now the third last byte is in DR, and the second last in the shift register.
       if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
       clear(cr1_ack);
-      in[at++] = static_cast<std::uint8_t>(i2c1_dr());
+      in[at++] = static_cast<std::uint8_t>(i2c_dr());
       if (const auto r = wait(sr1_finished); r != I2cResult::done) return r;
       set(cr1_stop);
-      in[at++] = static_cast<std::uint8_t>(i2c1_dr());
+      in[at++] = static_cast<std::uint8_t>(i2c_dr());
       if (const auto r = wait(sr1_received); r != I2cResult::done) return r;
     }
-    in[at] = static_cast<std::uint8_t>(i2c1_dr());
+    in[at] = static_cast<std::uint8_t>(i2c_dr());
     return I2cResult::done;
   }
 
   /// Waits until the requested stop is sent and the bus is no longer busy.
   I2cResult end() {
-    while ((i2c1_sr2() & sr2_busy) != 0) {
+    while ((i2c_sr2() & sr2_busy) != 0) {
       if (now_us() > until_us_) return I2cResult::timed_out;
     }
     return I2cResult::done;
@@ -135,18 +156,18 @@ class Transfer {
   I2cResult begin(std::uint32_t address) {
     set(cr1_start);
     if (const auto r = wait(sr1_started); r != I2cResult::done) return r;
-    i2c1_dr() = address;
+    i2c_dr() = address;
     return wait(sr1_address);
   }
 
   I2cResult wait(std::uint32_t flag) {
     while (true) {
-      const std::uint32_t status = i2c1_sr1();
+      const std::uint32_t status = i2c_sr1();
       if ((status & sr1_no_acknowledge) != 0) return I2cResult::no_acknowledge;
       if ((status & sr1_arbitration) != 0) return I2cResult::bus_stuck;
       // A misplaced start or stop does not change the transfer of a master (27.3.4, bus error); the check code of the
       // device finds a wrong byte. The controller may also report it without a cause (ES0182).
-      if ((status & sr1_bus_error) != 0) i2c1_sr1() = ~sr1_bus_error;
+      if ((status & sr1_bus_error) != 0) i2c_sr1() = ~sr1_bus_error;
       if ((status & flag) != 0) return I2cResult::done;
       if (now_us() > until_us_) return I2cResult::timed_out;
     }
@@ -157,23 +178,24 @@ class Transfer {
 
 }  // namespace
 
-void i2c_start() {
+void BMS_OF_BUS(i2c_start)() {
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;
-  rcc_apb1enr() = rcc_apb1enr() | 1U << 21;
+  rcc_apb1enr() = rcc_apb1enr() | clock_of_controller;
   gpiob_bsrr() = scl | sda;
   gpiob_otyper() = gpiob_otyper() | scl | sda;
-  gpiob_afrl() = (gpiob_afrl() & ~(255U << 24)) | 0x44U << 24;
-  i2c_recover();  // a device may still wait in the middle of a byte after a reset of this core
+  alternate_functions() = (alternate_functions() & ~(255U << four_bits)) | 0x44U << four_bits;
+  BMS_OF_BUS(i2c_recover)();  // a device may still wait in the middle of a byte after a reset of this core
 }
 
-I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, std::span<std::uint8_t> in) {
-  if ((i2c1_sr2() & sr2_busy) != 0) return I2cResult::bus_stuck;
+I2cResult BMS_OF_BUS(i2c_transfer)(std::uint8_t address, std::span<const std::uint8_t> out,
+                                   std::span<std::uint8_t> in) {
+  if ((i2c_sr2() & sr2_busy) != 0) return I2cResult::bus_stuck;
   Transfer transfer(i2c_time_us(out.size() + in.size()));
   I2cResult result = out.empty() ? I2cResult::done : transfer.write(address, out);
   if (result == I2cResult::done && !in.empty()) result = transfer.read(address, in);
   if (result == I2cResult::done && in.empty()) set(cr1_stop);
   if (result == I2cResult::no_acknowledge) {
-    i2c1_sr1() = i2c1_sr1() & ~sr1_no_acknowledge;
+    i2c_sr1() = i2c_sr1() & ~sr1_no_acknowledge;
     set(cr1_stop);
   }
   if (result == I2cResult::bus_stuck || result == I2cResult::timed_out) {
@@ -184,7 +206,7 @@ I2cResult i2c_transfer(std::uint8_t address, std::span<const std::uint8_t> out, 
   return ended == I2cResult::done ? result : ended;
 }
 
-bool i2c_recover() {
+bool BMS_OF_BUS(i2c_recover)() {
   gpiob_bsrr() = scl | sda;
   pins(1);  // outputs, open drain
   for (int k = 0; k < 9 && (gpiob_idr() & sda) == 0; ++k) {

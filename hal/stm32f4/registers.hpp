@@ -64,15 +64,6 @@ inline Register& adc1_sqr3() { return at<0x40012034>(); }
 inline Register& adc1_dr() { return at<0x4001204C>(); }
 inline Register& adc_ccr() { return at<0x40012304>(); }
 
-// I2C1 [27.6]
-inline Register& i2c1_cr1() { return at<0x40005400>(); }
-inline Register& i2c1_cr2() { return at<0x40005404>(); }
-inline Register& i2c1_dr() { return at<0x40005410>(); }
-inline Register& i2c1_sr1() { return at<0x40005414>(); }
-inline Register& i2c1_sr2() { return at<0x40005418>(); }
-inline Register& i2c1_ccr() { return at<0x4000541C>(); }
-inline Register& i2c1_trise() { return at<0x40005420>(); }
-
 // timer 3 [18.4]
 inline Register& tim3_cr1() { return at<0x40000400>(); }
 inline Register& tim3_smcr() { return at<0x40000408>(); }

@@ -28,9 +28,12 @@ ContactorParameters precharge_relay() {
   return relay;
 }
 
-Divider random_divider(Draw& draw, double tolerance) {
+/// The board of more than 16 cells has a divider of its own.
+double divider_ohm(std::size_t cells) { return cells > 16 ? 2e6 : 1e6; }
+
+Divider random_divider(Draw& draw, std::size_t cells, double tolerance) {
   const Divider typical;
-  return {.upper_ohm = draw.within(typical.upper_ohm, tolerance),
+  return {.upper_ohm = draw.within(divider_ohm(cells), tolerance),
           .lower_ohm = draw.within(typical.lower_ohm, tolerance),
           .bias_ohm = draw.within(typical.bias_ohm, tolerance),
           .capacitance_f = draw.within(typical.capacitance_f, 0.1)};
@@ -58,6 +61,7 @@ TruckParameters typical_world(std::size_t cells) {
   world.dc_link.idle_from_v *= share_of(cells);
   world.dc_link.lockout_v *= share_of(cells);
   world.dc_link.recuperation_limit_v *= share_of(cells);
+  world.plus_divider.upper_ohm = world.minus_divider.upper_ohm = divider_ohm(cells);
   world.relay[static_cast<std::size_t>(Relay::precharge)] = precharge_relay();
   return world;
 }
@@ -89,8 +93,8 @@ TruckParameters random_world(std::uint64_t seed, const WorldLimits& limits) {
   world.charger.idle_v = draw.chance(0.3) ? share * draw.between(20, 60) : 0;
   world.front_end.ld_ohm = draw.decades(0.5e6, 5e6);
   world.front_end.pack_ohm = draw.decades(0.5e6, 5e6);
-  world.plus_divider = random_divider(draw, limits.divider_tolerance);
-  world.minus_divider = random_divider(draw, limits.divider_tolerance);
+  world.plus_divider = random_divider(draw, limits.cells, limits.divider_tolerance);
+  world.minus_divider = random_divider(draw, limits.cells, limits.divider_tolerance);
   for (HallParameters& hall : world.hall) {
     hall = {.gain = draw.within(1, 0.01), .supply_v = draw.within(5, 0.02), .offset_v = draw.between(-0.01, 0.01)};
   }

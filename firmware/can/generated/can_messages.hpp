@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: cff7a54eb3a8cd437b4f5cda2145d4a8420e165d70d2c9e82a63a6fc2e4fed0c
+// SHA-256 of that file: 0e6e94c606a73131e0f532a0f514b3d40d93bcfaa74219619d262b97d0dd09d7
 #pragma once
 
 #include <array>
@@ -1936,11 +1936,22 @@ struct FrontEnd {
   static constexpr std::uint16_t id = 0x1a3;
   static constexpr std::uint32_t cycle_us = 1000000;  ///< 0: not cyclic
   static constexpr std::uint16_t data_id = 419;
-  static constexpr SignalLayout state_layout = {12, 4, false, 1.0F, 0.0F, 0.0F, 2.0F, false, 0};
-  std::uint32_t state = 0;  ///< Whether the chip measures.
+  static constexpr SignalLayout state_layout = {12, 4, false, 1.0F, 0.0F, 0.0F, 13.0F, false, 0};
+  std::uint32_t state = 0;  ///< Whether the chip measures. Of a pack of more than 16 cells, both; otherwise the half without readings, the lower one before the upper one.
   static constexpr std::uint32_t state_absent = 0;
   static constexpr std::uint32_t state_configuring = 1;
   static constexpr std::uint32_t state_measuring = 2;
+  static constexpr std::uint32_t state_lower_absent = 3;
+  static constexpr std::uint32_t state_upper_absent = 4;
+  static constexpr std::uint32_t state_lower_configuring = 5;
+  static constexpr std::uint32_t state_upper_configuring = 6;
+  static constexpr std::uint32_t state_swapped = 7;
+  static constexpr std::uint32_t state_lower_misplaced = 8;
+  static constexpr std::uint32_t state_upper_misplaced = 9;
+  static constexpr std::uint32_t state_lower_clock_wrong = 10;
+  static constexpr std::uint32_t state_upper_clock_wrong = 11;
+  static constexpr std::uint32_t state_lower_stale = 12;
+  static constexpr std::uint32_t state_upper_stale = 13;
   static constexpr SignalLayout cell_undervoltage_layout = {16, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t cell_undervoltage = 0;  ///< Undervoltage of a cell.
   static constexpr SignalLayout cell_overvoltage_layout = {17, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
@@ -2021,7 +2032,7 @@ struct FrontEnd {
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
   static void each_in_words(See&& see) {
-    { static constexpr std::array<ValueName, 3> names{{ValueName{0, "absent"}, ValueName{1, "configuring"}, ValueName{2, "measuring"}}}; see("State", "Whether the chip measures.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 14> names{{ValueName{0, "absent"}, ValueName{1, "configuring"}, ValueName{2, "measuring"}, ValueName{3, "lower absent"}, ValueName{4, "upper absent"}, ValueName{5, "lower configuring"}, ValueName{6, "upper configuring"}, ValueName{7, "swapped"}, ValueName{8, "lower misplaced"}, ValueName{9, "upper misplaced"}, ValueName{10, "lower clock wrong"}, ValueName{11, "upper clock wrong"}, ValueName{12, "lower stale"}, ValueName{13, "upper stale"}}}; see("State", "Whether the chip measures. Of a pack of more than 16 cells, both; otherwise the half without readings, the lower one before the upper one.", std::span<const ValueName>(names)); }
     see("CellUndervoltage", "Undervoltage of a cell.", std::span<const ValueName>());
     see("CellOvervoltage", "Overvoltage of a cell.", std::span<const ValueName>());
     see("ChargeOvercurrent", "Overcurrent while charging.", std::span<const ValueName>());

@@ -38,9 +38,10 @@ files::CellFile scaled(double capacity_ah) {
 
 Pack pack_of(double capacity_ah, std::size_t cells, const std::string& vehicle_profile) {
   const files::CellFile cell = capacity_ah == 6 ? files::read_cell("table9") : scaled(capacity_ah);
+  const bool stacked = cells > 16;
   return {capacity_ah, cell.parameters.limits.discharge_current_max_a, cells,
-          images::firmware_image("stm32f405_forklift", cell, images::Image::application, vehicle_profile,
-                                 cells == 16 ? 0 : cells)};
+          images::firmware_image(stacked ? "stm32f405_80v" : "stm32f405_forklift", cell, images::Image::application,
+                                 vehicle_profile, cells == (stacked ? 24U : 16U) ? 0 : cells)};
 }
 
 WorldSetup random_setup(const Pack& pack, std::uint64_t seed) {

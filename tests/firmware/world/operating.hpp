@@ -14,7 +14,7 @@ struct Pack {
   std::size_t cells = 16;
   std::filesystem::path image;
 };
-/// Builds the image of the forklift board for this pack, if it is not there yet.
+/// Builds the image of the forklift board, or of stm32f405_80v, for this pack, if it is not there yet.
 Pack pack_of(double capacity_ah, std::size_t cells = 16, const std::string& vehicle_profile = "none");
 /// Cells of a small forklift, and the cell whose thresholds firmware/protection/README.md prints.
 inline constexpr double truck_ah = 100, printed_ah = 6;

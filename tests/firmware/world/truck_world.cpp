@@ -14,8 +14,9 @@ using plant::Relay;
 
 namespace {
 
-constexpr unsigned i2c_clock = 6, i2c_data = 7, can_receive = 8, alert = 5, plus_auxiliary = 14, minus_auxiliary = 15,
-                   port_of_b = 1;
+constexpr unsigned i2c_clock = 6, i2c_data = 7, isolated_clock = 10, isolated_data = 11, can_receive = 8, alert = 5,
+                   plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
+constexpr std::uint32_t isolated_i2c_base = 0x40005800;  // I2C2
 constexpr unsigned key = 2, charger_plug = 3, coil_supply = 4, interlock_loop = 5, crash_sensor = 13, port_of_c = 2;
 constexpr double longest_sleep_us = 100;  ///< the front end and the converter are asked for interrupts so often
 constexpr double least_step_ms = 1e-3;
@@ -82,6 +83,7 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
       vehicle(board),
       setup_(setup),
       i2c_(board, chip),
+      upper_i2c_(board, upper_chip),
       noise_(setup.seed + 29) {
   held_v_.fill(std::nan(""));
   for (std::size_t k = 0; k < 4; ++k) set_temperature(k, 25);
@@ -93,6 +95,7 @@ TruckWorld::TruckWorld(const std::filesystem::path& image, const WorldSetup& set
                    {GpioPort::base(2), &port_c},
                    {ExtiModel::base, &exti},
                    {AdcModel::base, &adc}};
+  if (stacked()) board.plugged.insert({isolated_i2c_base, &upper_i2c_});
   adc.offset_lsb = setup.adc_offset_lsb;
   adc.pin_v = [this](unsigned channel) {
     const plant::PinVoltages v = truck.pins();
@@ -174,9 +177,12 @@ void TruckWorld::fine_steps(double duration_ms, double step_ms) {
 void TruckWorld::apply_pins() {
   plant::ControllerPins pins;
   for (std::size_t k = 0; k < plant::relays; ++k) pins.relay[k] = at_driver(pin(static_cast<Relay>(k)));
-  pins.ddsg = at_driver(chip.ddsg_level());
-  pins.dchg = at_driver(chip.dchg_level());
-  const bool enables[2] = {chip.ddsg(), chip.dchg()};
+  // Of two chips both must enable; the isolator's output is low without its supply.
+  const bool upper_enables[2] = {!stacked() || (isolator_supplied && upper_chip.ddsg()),
+                                 !stacked() || (isolator_supplied && upper_chip.dchg())};
+  pins.ddsg = upper_enables[0] ? at_driver(chip.ddsg_level()) : plant::PinLevel::low;
+  pins.dchg = upper_enables[1] ? at_driver(chip.dchg_level()) : plant::PinLevel::low;
+  const bool enables[2] = {upper_enables[0] && chip.ddsg(), upper_enables[1] && chip.dchg()};
   if (port_c.writes != seen_writes_ || enables[0] != enables_[0] || enables[1] != enables_[1]) {
     seen_writes_ = port_c.writes;
     enables_[0] = enables[0];
@@ -216,6 +222,11 @@ void TruckWorld::observe() {
   update_inputs(v);
   port_b.set_outside(i2c_data, true);
   port_b.set_outside(i2c_clock, !chip.hung);
+  if (stacked()) {
+    port_b.set_outside(isolated_data, true);
+    port_b.set_outside(isolated_clock, !upper_chip.hung);
+    upper_chip.gone = !isolator_supplied;
+  }
   update_chip();
   if (chip.alert() != !port_b.outside(alert)) {
     port_b.set_outside(alert, !chip.alert());
@@ -256,29 +267,42 @@ void TruckWorld::update_supply(double vdda_v) {
   }
 }
 
+/// Two chips: the larger half of an odd number at the lower one, which has the shunt (boards/stm32f405_80v/README.md).
 void TruckWorld::update_chip() {
+  const std::size_t cells = truck.cell_count(), below = stacked() ? (cells + 1) / 2 : cells;
+  update_chip(chip, 0, below);
+  if (stacked()) update_chip(upper_chip, below, cells - below);
+}
+
+void TruckWorld::update_chip(Bq76952Model& which, std::size_t first, std::size_t count) {
   const plant::PinVoltages v = truck.pins();
+  const bool is_lower = &which == &chip;
   Bq76952Inputs in;
   in.ts2_low = key_on || plugged;
-  in.stack_v = sensors.stack_error_v;
-  const std::size_t cells = truck.cell_count();
-  for (std::size_t k = 0; k < cells; ++k) {
-    const double cell_v = truck.cell_v(k);
-    double& input_v = in.cell_v[k + 1 < cells ? k : in.cell_v.size() - 1];  // hal/bq76952/README.md, wiring
+  in.stack_v = is_lower ? sensors.stack_error_v : 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    const double cell_v = truck.cell_v(first + k);
+    double& input_v = in.cell_v[k + 1 < count ? k : in.cell_v.size() - 1];  // hal/bq76952/README.md, wiring
     in.stack_v += cell_v;
-    input_v = cell_v + sensors.cell_error_v[k];
+    input_v = cell_v + sensors.cell_error_v[first + k];
     if (setup_.cell_noise_v > 0) input_v += setup_.cell_noise_v * noise_.normal();
   }
-  in.pack_v = v.pack_v;
-  in.ld_v = v.ld_v;
-  in.shunt_v = sensors.shunt_factor * v.shunt_v;
-  if (setup_.shunt_noise_v > 0) in.shunt_v += setup_.shunt_noise_v * noise_.normal();
-  for (std::size_t k = 0; k < thermistor_pin.size(); ++k) {
-    in.thermistor_ohm[static_cast<std::size_t>(thermistor_pin[k])] = ohm_[k];
+  if (stacked()) {
+    in.pack_v = is_lower ? 0 : in.stack_v;  // the place of the chip; LD is at VSS
+  } else {
+    in.pack_v = v.pack_v;
+    in.ld_v = v.ld_v;
   }
+  if (is_lower) {
+    in.shunt_v = sensors.shunt_factor * v.shunt_v;
+    if (setup_.shunt_noise_v > 0) in.shunt_v += setup_.shunt_noise_v * noise_.normal();
+  }
+  const std::size_t thermistors = stacked() ? 2 : thermistor_pin.size(), first_sensor = is_lower ? 0 : thermistors;
+  for (std::size_t k = 0; k < thermistors; ++k)
+    in.thermistor_ohm[static_cast<std::size_t>(thermistor_pin[k])] = ohm_[first_sensor + k];
   const auto now_us = static_cast<std::uint64_t>(1e3 * now_ms());
-  if (now_us > chip.time_us) chip.advance(now_us - chip.time_us);  // with the values of the step that ends now
-  chip.advance(0, in);
+  if (now_us > which.time_us) which.advance(now_us - which.time_us);  // with the values of the step that ends now
+  which.advance(0, in);
 }
 
 // ---- the test's hands ----
@@ -366,9 +390,10 @@ std::vector<TruckWorld::Closing> TruckWorld::closings_below_v(double volt, std::
 
 std::vector<std::string> TruckWorld::violations() const {
   std::vector<std::string> all = i2c_.violations();
-  for (const auto* more :
-       {&chip.violations, &board.can.violations, &board.rcc.violations, &board.flash.violations, &adc.violations,
-        &port_a.violations, &port_b.violations, &port_c.violations, &rtc.violations}) {
+  const std::vector<std::string> of_upper = upper_i2c_.violations();
+  for (const auto* more : {&of_upper, &chip.violations, &upper_chip.violations, &board.can.violations,
+                           &board.rcc.violations, &board.flash.violations, &adc.violations, &port_a.violations,
+                           &port_b.violations, &port_c.violations, &rtc.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
   return all;

@@ -38,7 +38,7 @@ struct WorldSetup {
 
 /// Errors of what the front end senses; the circuit does not know them.
 struct SensorFaults {
-  std::array<double, 16> cell_error_v{};
+  std::array<double, 32> cell_error_v{};
   double stack_error_v = 0;
   double shunt_factor = 1;  ///< 0: a wire of the shunt is off
   double hall_error_v = 0;  ///< at PA1
@@ -123,8 +123,12 @@ class TruckWorld {
   /// Violations of the chip's manuals by the firmware.
   std::vector<std::string> violations() const;
 
+  /// More than 16 cells: the board stm32f405_80v, with a second chip.
+  bool stacked() const { return truck.cell_count() > 16; }
+
   firmware::UnicornBoard board;
-  Bq76952Model chip;
+  Bq76952Model chip, upper_chip;  ///< the one with the lower cells, or all; the one with the upper cells
+  bool isolator_supplied = true;  ///< false: no supply on its side of the upper chip
   plant::Truck truck;
   GpioPort port_a, port_b, port_c;
   ExtiModel exti;
@@ -143,13 +147,14 @@ class TruckWorld {
   void observe();
   void update_supply(double vdda_v);
   void update_chip();
+  void update_chip(Bq76952Model& which, std::size_t first, std::size_t count);
   void update_held_cells();
   void update_lateness();
   void update_auxiliary(unsigned pin, double pin_v, double vdda_v);
   void update_inputs(const plant::PinVoltages& v);
 
   WorldSetup setup_;
-  WorldI2c i2c_;
+  WorldI2c i2c_, upper_i2c_;
   plant::Random noise_;
   double truck_start_s_ = 0, fine_until_ms_ = 0, fine_step_ms_ = 1, switching_until_ms_ = 0, opened_ms_ = -1;
   double released_ms_ = never, late_ms_ = 0, late_edge_ms_ = 0;
@@ -158,7 +163,7 @@ class TruckWorld {
   std::size_t seen_events_ = 0;
   std::uint64_t seen_writes_ = 0;
   bool enables_[2] = {false, false};
-  std::array<double, 16> held_v_;
+  std::array<double, 32> held_v_;
   bool any_held_ = false;
   std::array<double, 4> celsius_{25, 25, 25, 25}, ohm_{};
   std::vector<double> edges_ms_;

@@ -127,6 +127,7 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
       }
       pack_state_ms_ = at_ms;
       soc_percent_ = 0.002 * static_cast<double>(field(frame, 16, 16));
+      soc_sigma_percent_ = 0.002 * static_cast<double>(field(frame, 32, 16));
       break;
     case board_id:
       longest_sample_ms_ = 0.01 * static_cast<double>(field(frame, 48, 16));

@@ -36,6 +36,7 @@ class Vehicle {
   double allowed_discharge_a() const { return allowed_discharge_a_; }
   double longest_sample_ms() const { return longest_sample_ms_; }  ///< Board.LongestSample; negative: not published
   double soc_percent() const { return soc_percent_; }
+  double soc_sigma_percent() const { return soc_sigma_percent_; }
   /// Shortest and longest time between two PackState messages, one of each sample [ms].
   double shortest_cycle_ms = 1e9, longest_cycle_ms = 0;
   double silent_ms() const;  ///< since the last Faults message
@@ -70,7 +71,8 @@ class Vehicle {
   std::uint64_t faults_ = 0, seen_ = 0;
   unsigned first_cause_ = 0, state_ = 15;
   bool charge_enabled_ = false, coils_dead_seen_ = false;
-  double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1, longest_sample_ms_ = -1;
+  double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1, soc_sigma_percent_ = 0,
+         longest_sample_ms_ = -1;
   std::vector<Change> changes_;
 };
 
