@@ -40,7 +40,8 @@ class AmbiguousSoc {
  public:
   /// Probability that the SOC is elsewhere (SocBank::apart_soc), from which the bank replaces the state of the filter.
   /// The misfit of the best hypothesis alone would not do: a given start has one place, the others share theirs.
-  static constexpr double replaces_above = 0.5;
+  /// A start and all other SOCs have even odds before any voltage; the voltages have to change them to e to 1.
+  static constexpr double replaces_above = 0.731;
   /// The bank watches until all SOCs this far away have a misfit of that much more: e^9 to 1.
   static constexpr double watches_beyond = 0.1, closes_above = 9;
 

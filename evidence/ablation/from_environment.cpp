@@ -28,7 +28,7 @@ Number number(std::string_view name, double& value) {
   return {name, [&value](double given) { value = given; }};
 }
 
-std::array<Number, 41> numbers() {
+std::array<Number, 40> numbers() {
   auto& d = thresholds.decision;
   auto& a = thresholds.adequacy;
   auto& p = thresholds.probability;

@@ -55,6 +55,8 @@ class OneChip {
     if (state == State::measure) health.state = FrontEndState::measuring;
     return health;
   }
+  /// Voltage at LD; measurement::no_reading if unknown.
+  std::int32_t dc_link_uv() const { return chip_.dc_link_uv(); }
   void shut_down() { chip_.shut_down(); }
   /// cells: one bit per cell of the pack.
   void bleed(std::uint32_t cells) { chip_.bleed(inputs_of(board_configuration, cells)); }

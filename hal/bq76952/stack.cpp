@@ -76,6 +76,15 @@ void Stack::clear_latch() {
   for (Half& half : halves_) half.chip.clear_latch();
 }
 
+std::int32_t Stack::dc_link_uv() const {
+  std::int32_t highest_uv = 0;
+  for (const Half& half : halves_) {
+    if (half.chip.dc_link_uv() == measurement::no_reading) return measurement::no_reading;
+    highest_uv = std::max(highest_uv, half.chip.dc_link_uv());
+  }
+  return highest_uv;
+}
+
 void Stack::shut_down() {
   for (Half& half : halves_) half.chip.shut_down();
 }

@@ -47,6 +47,8 @@ class Stack {
   std::uint32_t trips() const { return trips_; }
   void clear_latch();
   FrontEndHealth health() const;
+  /// The higher one of both chips' LD; measurement::no_reading if one is unknown.
+  std::int32_t dc_link_uv() const;
   void shut_down();
   /// cells: one bit per cell of the pack. A chip that is not in its place gets none.
   void bleed(std::uint32_t cells);

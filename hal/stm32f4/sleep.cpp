@@ -7,8 +7,9 @@
 //
 // PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230).
 //
-// The CAN controller is off the bus from before the stop until the next sample is processed, also while the core is
-// awake. An edge of CAN RX in all this time means that a node talks: the chip stays awake and receives its next frame.
+// The CAN controller is off the bus from before the stop until the next frames are read, and joins eleven recessive
+// bits later. An edge of CAN RX in all this time means that a node talks: the chip stays awake and receives its next
+// frame.
 //
 // The real-time clock measures the time asleep, to 1/256 s. It needs the 32,768 Hz crystal: without it, or if it dies
 // later, which its ready flag does not show, the chip waits for interrupts instead.
@@ -106,9 +107,9 @@ void end_timer() {
   lock();
 }
 
-/// Interrupts wake the core; their handlers run when the clocks do. Returns the time at which the clock stopped.
+/// Interrupts are masked: they wake the core, and their handlers run when the clocks do. Returns the time at which the
+/// clock stopped.
 std::uint64_t stop() {
-  asm volatile("cpsid i" ::: "memory");
   const std::uint64_t stopped_us = pause_clock();
   nvic_icer1() = clock_check;  // on the internal oscillator every measurement is wrong
   stop_clocks();
@@ -134,7 +135,7 @@ void watch_bus() {
   exti_pr() = receive_line;
 }
 
-/// An edge since watch_bus() wakes the core at once.
+/// An edge since watch_bus() wakes the core at once. Interrupts are masked: those of the lines have no handler.
 void listen() {
   gpiob_bsrr() = only_listens;
   gpiob_moder() = (gpiob_moder() & ~(3U << 24)) | 1U << 24;
@@ -157,9 +158,9 @@ void end_listening() {
 void set_parked(bool now) { parked = now; }
 
 void rest_until(std::uint64_t due_us) {
-  if (std::exchange(off_the_bus, false) && (exti_pr() & receive_line) != 0) can_active();
   const std::uint64_t now = now_us();
   if (!parked || clock_died || due_us < now + start_us + shortest_us || !clock_runs()) return wait_for_interrupt();
+  if (std::exchange(off_the_bus, false) && (exti_pr() & receive_line) != 0) can_active();
   watch_bus();
   if (!can_suspend(silence_before_stop_us)) return wait_for_interrupt();
   off_the_bus = true;
@@ -169,6 +170,7 @@ void rest_until(std::uint64_t due_us) {
     clock_died = true;  // or the controller would leave the bus again and again
     return wait_for_interrupt();
   }
+  asm volatile("cpsid i" ::: "memory");
   listen();
   const std::uint64_t awake_us = stop() - before_us;  // in both clocks
   const auto after = day_ticks();

@@ -131,14 +131,15 @@ void bind_replay_result(py::module_& module) {
       "flags", [](const Result& r) { return view_of_rows(r, &numbers_of(r)->flags, sizeof(EstimateRow)); },
       "Why an estimate is less accurate, greybox_bms.FLAGS or-ed: shape (n,), uint32.");
   c.def_property_readonly("states", &states_of, "{name: shape (n,)}: further states of an extended cell [V, K, A].");
-  c.def_property_readonly("figures", &figures_of,
-                          "Errors against soc_ref and of the voltage [V], as in the summary of bms replay.");
+  c.def_property_readonly(
+      "figures", &figures_of,
+      "Errors against soc_ref and of the voltage [V]; the charge is counted with the cell file's capacity.");
   c.def_property_readonly(
       "doubts", [](const Result& r) { return r->doubts; }, "Why the estimates are not reliable; empty if they are.");
   c.def_property_readonly(
       "warnings", [](const Result& r) { return pairs(r->recording.warnings); }, "[(id, text)] of the recording.");
   c.def(
-      "trace_csv", [](const Result& r) { return replay::trace_csv(*r); }, "The CSV of bms replay --trace.");
+      "trace_csv", [](const Result& r) { return replay::trace_csv(*r); }, "The columns of bms replay --trace.");
   c.def("__len__", [](const Result& r) { return r->track.rows.size(); });
 }
 

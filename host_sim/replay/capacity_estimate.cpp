@@ -10,6 +10,7 @@
 
 #include "model/cell.hpp"
 #include "model/one_rc.hpp"
+#include "replay/judgement.hpp"
 #include "replay/simulation.hpp"
 
 namespace bms::replay {
@@ -262,19 +263,26 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   return CapacityEstimate{mean, sigma};
 }
 
+files::CellFile counted_cell(const ReplayResult& r) {
+  files::CellFile cell = r.cell;
+  if (!r.counted_capacity_ah || !r.capacity) return cell;
+  cell.parameters.capacity_ah = *r.counted_capacity_ah;
+  model::Noise& noise = cell.parameters.noise;
+  const double error = r.capacity->std_ah / r.capacity->value_ah;
+  if (noise.errors_are_states)
+    noise.current_gain = std::min(std::hypot(noise.current_gain, error), model::accepted::most_gain);
+  return cell;
+}
+
 bool count_with_estimated_capacity(ReplayResult& r, const measurement::SampleList& samples,
                                    const std::optional<measurement::StartingPoint>& start) {
   if (!capacity_differs(r)) return false;
-  files::CellFile cell = r.cell;
-  cell.parameters.capacity_ah = r.capacity->value_ah;
-  model::Noise& noise = cell.parameters.noise;
-  const double error = r.capacity->std_ah / r.capacity->value_ah;
-  if (noise.errors_are_states) noise.current_gain = std::hypot(noise.current_gain, error);
-  Track by_file = std::exchange(r.track, run_on_host(cell, samples, start, r.scalar, Timing::none));
-  r.track.steps_per_second = by_file.steps_per_second;
   r.counted_capacity_ah = r.capacity->value_ah;
+  Track by_file = std::exchange(r.track, run_on_host(counted_cell(r), samples, start, r.scalar, Timing::none));
+  r.track.steps_per_second = by_file.steps_per_second;
   const auto again = estimate_capacity(r);
-  if (!again || std::abs(again->value_ah - r.capacity->value_ah) > differs_sigmas * r.capacity->std_ah) {
+  if (!again || std::abs(again->value_ah - r.capacity->value_ah) > differs_sigmas * r.capacity->std_ah ||
+      judge(r).impossible) {
     r.track = std::move(by_file);
     r.counted_capacity_ah.reset();
     return false;

@@ -19,6 +19,9 @@ namespace bms::replay {
 /// result.prior.
 std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& result);
 
+/// The cell file with the capacity that the charge is counted with, and its error where the filter can have one.
+files::CellFile counted_cell(const ReplayResult& result);
+
 /// Runs the estimator again with the estimated capacity, if that is another one than the cell file's
 /// (capacity_differs), and evaluates result again. What the second run says of the capacity has to agree with the
 /// first: an estimate that its own count does not confirm is not used. samples, start: as for the first run; result is

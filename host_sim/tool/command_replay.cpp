@@ -201,14 +201,13 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
     result.difference = replay::difference_to_log(*run.log, result.track, run.compared);
     if (!result.difference && run.compared > 0) result.verified_against = "log";
   }
-  judge(options, result);
   if (!run.log)
     result.open_loop_soc = workflow::recording_start(result.recording, result.cell, options.initial_soc).start.soc;
   replay::evaluate(result);
   // a board counts with the capacity that it has
-  if (run.board == nullptr && !run.log &&
-      replay::count_with_estimated_capacity(result, measurement::SampleList(result.recording), run.start))
-    judge(options, result);
+  if (run.board == nullptr && !run.log)
+    replay::count_with_estimated_capacity(result, measurement::SampleList(result.recording), run.start);
+  judge(options, result);
   if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
 }
 

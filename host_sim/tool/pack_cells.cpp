@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "replay/capacity_estimate.hpp"
 #include "replay/lanes.hpp"
 #include "replay/simulation.hpp"
 
@@ -17,8 +18,9 @@ namespace {
 /// Estimates of one cell after the other.
 std::vector<replay::Track> tracks_of(const std::vector<measurement::Recording>& cells, const replay::ReplayResult& mean,
                                      const std::optional<measurement::StartingPoint>& start) {
+  const files::CellFile cell = replay::counted_cell(mean);
   std::vector<replay::LaneInput> inputs;
-  for (const measurement::Recording& one : cells) inputs.push_back({mean.cell, measurement::SampleList(one), start});
+  for (const measurement::Recording& one : cells) inputs.push_back({cell, measurement::SampleList(one), start});
   if (mean.scalar == replay::ScalarKind::float32) return replay::run_in_lanes(inputs).tracks;
   std::vector<replay::Track> tracks;
   for (const replay::LaneInput& in : inputs)

@@ -66,7 +66,7 @@ TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
   EXPECT_NEAR(r.state.charge.soc(r.cell.charge), 0.05, 0.02);
 }
 
-/// The place of the filter is the most probable one, but not as probable as all others together.
+/// The place of the filter is the most probable one, but all others together are e times as probable.
 TEST(AmbiguousSoc, TakesOverFromTheFilterWhenTheSocIsMoreProbablyElsewhere) {
   const auto takes_over = [](double others) {
     Restart r(0.5);
@@ -76,8 +76,22 @@ TEST(AmbiguousSoc, TakesOverFromTheFilterWhenTheSocIsMoreProbablyElsewhere) {
     return !r.ambiguous.in_background();
   };
   EXPECT_TRUE(takes_over(0.5));
-  EXPECT_TRUE(takes_over(2.0)) << "58 e^-2 = 7.8, and 6 at the filter's place";
-  EXPECT_FALSE(takes_over(2.5)) << "58 e^-2.5 = 4.8";
+  EXPECT_TRUE(takes_over(1.0)) << "58 e^-1 = 21.3, and 6 at the filter's place";
+  EXPECT_FALSE(takes_over(1.5)) << "58 e^-1.5 = 12.9";
+}
+
+TEST(AmbiguousSoc, AStartThatNoVoltageContradictsStays) {
+  for (const double soc : {0.02, 0.5, 0.9, 0.98, 1.0}) {
+    for (const double sigma : {0.01, 0.02, 0.028}) {
+      Restart r(soc);
+      const SocDistribution<double> before{soc, sigma * sigma};
+      const StartMisfit<double, decltype(r.cell)> misfit{r.cell, nullptr, &before, WrongPrior::even_odds};
+      r.ambiguous.open_at(soc, misfit, true, 100);  // the model was off by volts: no voltage says anything
+      for (int k = 0; k < 300; ++k) r.second(soc);
+      EXPECT_TRUE(r.ambiguous.in_background() || !r.ambiguous.open()) << soc << ", " << sigma;
+      EXPECT_NEAR(r.state.charge.soc(r.cell.charge), soc, 1e-9) << sigma;
+    }
+  }
 }
 
 TEST(AmbiguousSoc, TheModelsErrorAndTheStatesThatAreNotCorrectedPersist) {

@@ -156,7 +156,9 @@ void start_elsewhere(PackState& s, std::size_t c) {
   if (lag_s == 0) return;
   start[delay] = 0;
   other = fit_cell(input_of(s, c), start, prior_of(s, c, true), noise_for(s, c));
-  if (other.cost >= s.fits[c].cost) return;
+  // a fit that comes back to the lag says that it is there
+  const bool without_lag = std::abs(other.theta[delay]) < std::abs(lag_s) / 2;
+  if (!without_lag || !(other.cost < s.fits[c].cost)) return;
   s.fits[c] = std::move(other);
   lag_s = 0;
   for (std::vector<Accusation>* list : {&s.late, &s.accused}) std::erase(*list, Accusation{Cause::late, c});

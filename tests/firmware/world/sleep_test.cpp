@@ -118,7 +118,7 @@ class NodeInStep {
 };
 
 TEST_F(Sleep, ANodeThatSendsInStepWithTheSamplesIsReceivedWithItsSecondFrame) {
-  constexpr double step_ms = 2.5, period_ms = 1'000;
+  constexpr double step_ms = 2.5, period_ms = 600;  // by itself the battery sends a second after an edge
   Cases cases(processors());
   for (double phase_ms = 0; phase_ms < 100; phase_ms += step_ms) {
     cases.start(fmt::format("{} ms after a sample", phase_ms), [&, phase_ms](Outcome& outcome) {
@@ -144,7 +144,7 @@ TEST_F(Sleep, ANodeThatSendsInStepWithTheSamplesIsReceivedWithItsSecondFrame) {
   }
   fmt::print("{} phases, {} received with the first frame, all after {:.0f} ms\n", all, with_the_first, latest_ms);
   EXPECT_EQ(all, 40);
-  EXPECT_LT(latest_ms, period_ms + 200);
+  EXPECT_LT(latest_ms, period_ms + 200) << "before it would have sent by itself";
 }
 
 /// Its ready flag stays, and its wake-up timer counts no more: a chip that stopped would be reset for ever.

@@ -151,7 +151,7 @@ TEST(HealthyNull, OneOrTwoBlocksRaiseNoMoreFalseAlarms) {
   std::gamma_distribution<double> chi_square(1, 2);  // of two degrees of freedom
   for (const std::size_t blocks : {std::size_t{1}, std::size_t{2}}) {
     for (const double covered : {0.0, 0.5, 1.0}) {
-      int alarms = 0, of_a_fault = 0;
+      int alarms = 0, of_another_cause = 0, of_a_fault = 0;
       constexpr int trials = 20'000;
       for (int trial = 0; trial < trials; ++trial) {
         const double own = 0.5 * std::sqrt(2 / chi_square(random));
@@ -160,9 +160,13 @@ TEST(HealthyNull, OneOrTwoBlocksRaiseNoMoreFalseAlarms) {
         const HealthyNull null(blocks_of_offset(gains), 0.05, 3'600);
         const double next = 4 + std::hypot(own, log_spread_beyond(covered)) * normal(random);
         alarms += null.compare("voltage_offset", 26 * std::exp(next), covered).stands_out ? 1 : 0;
+        of_another_cause += null.compare("channel_skew", 26 * std::exp(next), covered).stands_out ? 1 : 0;
         of_a_fault += null.compare("channel_skew", 26 * std::exp(next + 8), covered).stands_out ? 1 : 0;
       }
       EXPECT_LE(alarms, 1.2 * 0.05 * trials) << blocks << " blocks, " << covered;
+      // a cause that the blocks do not show, as large as the one that they show
+      if (blocks == 1) EXPECT_LE(of_another_cause, 1.2 * 0.05 * trials) << covered;
+      if (blocks == 1) EXPECT_GE(of_another_cause, 0.2 * 0.05 * trials) << "the rate is also used, " << covered;
       EXPECT_GE(of_a_fault, 0.5 * trials) << blocks << " blocks, " << covered;
     }
   }
