@@ -241,6 +241,11 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
     chi2.emplace_back(ratio * file_ah, lowest - 2 * std::log(sum));
     best = std::min(best, lowest);
   }
+  const auto check = [](double value) {
+    if (!std::isfinite(value))
+      throw std::runtime_error("the capacity is not a finite number, so that there is no answer");
+  };
+  check(best);
   if (best > worst_fit * static_cast<double>(list.size())) return std::nullopt;
   double least = INFINITY, weight = 0, mean = 0, square = 0;
   for (const auto& [ah, of] : chi2) least = std::min(least, of);
@@ -256,8 +261,8 @@ std::optional<CapacityEstimate> estimate_capacity(const ReplayResult& r) {
   const double counted_ah = highest.charge_ah - lowest.charge_ah,
                drift_ah = offset_a(r) * r.recording.duration_s() / 3'600;
   const double sigma = std::hypot(spread, gain_share * mean, mean * drift_ah / std::max(1e-9, counted_ah));
-  if (!std::isfinite(mean) || !std::isfinite(sigma))
-    throw std::runtime_error("the capacity is not a finite number, so that there is no answer");
+  check(mean);
+  check(sigma);
   const bool at_bound = mean - 2 * spread < least_ratio * file_ah || mean + 2 * spread > most_ratio * file_ah;
   if (at_bound || sigma > known_to * mean) return std::nullopt;
   return CapacityEstimate{mean, sigma};

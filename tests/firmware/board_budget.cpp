@@ -37,21 +37,28 @@ std::vector<measurement::Sample> two_minutes() {
   return {all.begin() + 3000, all.begin() + 3125};
 }
 
+template <std::size_t Cells>
+std::vector<can::Frame> pack_frames_of(const measurement::Sample& s, std::uint16_t counter) {
+  measurement::PackSample<Cells> pack;
+  pack.time_us = s.time_us;
+  pack.current_ua = s.current_ua;
+  pack.cell_uv.fill(s.voltage_uv);
+  pack.pack_uv = static_cast<std::int32_t>(Cells) * s.voltage_uv;
+  pack.temperature_cdegc.fill(s.temperature_cdegc);
+  const auto frames = hal::frames_of(pack, 0, counter);
+  return {frames.begin(), frames.end()};
+}
+
 BudgetRun run_in_unicorn(const std::string& board_name) {
   UnicornBoard board(images::firmware_image(board_name, files::read_cell("table9"), images::Image::remote));
   board.by_instructions = true;
   if (!board.run_until([&] { return board.can.on_the_bus(); }, 3'000))
     throw std::runtime_error(board_name + " does not start");
   std::uint16_t counter = 0;
+  const auto frames_of = images::board_cells(board_name) > 16 ? pack_frames_of<24> : pack_frames_of<16>;
   for (const measurement::Sample& s : two_minutes()) {
-    measurement::PackSample<16> pack;
-    pack.time_us = s.time_us;
-    pack.current_ua = s.current_ua;
-    pack.cell_uv.fill(s.voltage_uv);
-    pack.pack_uv = 16 * s.voltage_uv;
-    pack.temperature_cdegc.fill(s.temperature_cdegc);
     const unsigned fed = board.watchdog_feeds;
-    for (const can::Frame& frame : hal::frames_of(pack, 0, counter++)) {
+    for (const can::Frame& frame : frames_of(s, counter++)) {
       board.can.deliver(frame);
       if (!board.run_until([&] { return !board.can.receive_interrupt(); }, 1))
         throw std::runtime_error(board_name + " receives no frame");
