@@ -146,5 +146,20 @@ TEST(SingleReadings, ALoadWithAPeriodOfSomeRowsMakesNoChannelLate) {
     EXPECT_NE(f.cause, dp::Cause::late) << *f.cell << ": " << f.value << " +- " << f.sigma;
 }
 
+/// The other way round: a lag that is there stays, whatever the fit without it says.
+TEST(SingleReadings, AChannelThatIsThreeRowsLateIsNamed) {
+  constexpr std::size_t late = 1, rows = 3;
+  dp::PackRecording pack = simulate({.rows_s = 2, .hours = 3}, random_steps(15, -1.5, 1.5, 8)).pack;
+  std::vector<double>& v = pack.cell_v[late];
+  std::shift_right(v.begin(), v.end(), rows);
+  bool found = false;
+  for (const dp::PackFinding& f : dp::diagnose_pack(tests::table9, pack, {}).findings) {
+    EXPECT_TRUE(f.cause == dp::Cause::late && f.cell == late) << "another cell or cause";
+    EXPECT_NEAR(f.value, 2.0 * rows, 1);
+    found = true;
+  }
+  EXPECT_TRUE(found);
+}
+
 }  // namespace
 }  // namespace bms
