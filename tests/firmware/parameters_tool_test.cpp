@@ -131,6 +131,7 @@ class ParametersTool : public ::testing::Test {
   }
 
   files::TemporaryFolder folder_;
+  tests::PseudoTerminal probe_;  ///< skips a test whose batteries could open none
 };
 
 TEST_F(ParametersTool, GetsSetsSavesAndLoadsAndTheNextStartHasThem) {
