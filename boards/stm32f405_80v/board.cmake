@@ -24,7 +24,7 @@ set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors hav
 set(BMS_INPUTS charger_plug coil_supply interlock crash)
 set(BMS_OUTPUTS heater fan soc_lamp)
 set(BMS_SECOND_CURRENT hall)  # absent: a truck without a Hall sensor
-set(BMS_SLEEPS OFF)  # ON: a frame that comes while the chip is awake but off the bus is not received (L-27)
+set(BMS_SLEEPS OFF)  # ON: not tried with two chips
 set(BMS_SWITCHES_OFF OFF)  # ON: with REG1 in the supply and TS2 at key and plug (README.md, supply), and the input key
 set(BMS_INSULATION absent)  # pwm: Bender IR155; iso175: Bender iso175, over CAN
 # Budgets of the image for the chip [bytes]: flash, static RAM, worst-case stack; and the longest processing time of a

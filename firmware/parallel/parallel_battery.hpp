@@ -12,8 +12,7 @@
 //             divided by the largest use of a limit. It rises slowly and falls at once. After each change of the
 //             connected ones it begins with share_start of their number times the weakest limit
 //   loss      a battery that receives nothing from its leader for leave_us opens, as nobody says its limits to the
-//   truck. While
-//             nothing arrives from one battery, nothing closes
+//             truck. While nothing arrives from one battery, nothing closes
 //
 // A current > 0 charges. Integers only.
 #pragma once

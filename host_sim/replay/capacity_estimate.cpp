@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "estimator/persistent_errors.hpp"
 #include "model/cell.hpp"
 #include "model/one_rc.hpp"
 #include "replay/judgement.hpp"
@@ -141,7 +142,7 @@ struct Weight {
 };
 
 std::vector<Weight> weights_of(const std::vector<Stretch>& list, double file_ah) {
-  constexpr double own = 1.0 / 4, shared = 1 - own;  // as in the estimator (persistent_errors.hpp)
+  constexpr double own = estimator::uncorrelated_share, shared = 1 - own;
   std::vector<Weight> weights;
   double known = shared;  // variance of the shared error
   for (std::size_t k = 0; k < list.size(); ++k) {

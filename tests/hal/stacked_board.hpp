@@ -10,6 +10,7 @@
 
 #include "hal/bq76952/configuration.hpp"
 #include "hal/i2c.hpp"
+#include "tests/hal/bq76952_board.hpp"
 #include "tests/hal/bq76952_model.hpp"
 
 namespace bms {
@@ -57,20 +58,12 @@ class StackedBoard {
 /// At the end of both buses; the last one that was made.
 extern StackedBoard* stacked_board;
 
-/// All thresholds are beyond what a test without a fault reaches.
-inline constexpr hal::bq76952::Board lower_board_under_test{.cell_inputs = hal::bq76952::inputs_of_pack(13),
-                                                            .four_thermistors = false,
-                                                            .overvoltage_v = 3.8,
-                                                            .undervoltage_v = 2.0,
-                                                            .voltage_delay_s = 1,
-                                                            .overcurrent_a = 350,
-                                                            .overcurrent_delay_s = 0.42,
-                                                            .high_overcurrent_a = 450,
-                                                            .high_overcurrent_delay_s = 0.3,
-                                                            .short_circuit_a = 600,
-                                                            .sustained_a = 310,
-                                                            .charge_hot_c = 50,
-                                                            .discharge_hot_c = 65,
-                                                            .charge_cold_c = -5};
+/// The chip of bq76952_board.hpp, with the lower cells and their two thermistors.
+inline constexpr hal::bq76952::Board lower_board_under_test = [] {
+  hal::bq76952::Board board = board_under_test;
+  board.cell_inputs = hal::bq76952::inputs_of_pack(StackedBoard::cells_below);
+  board.four_thermistors = false;
+  return board;
+}();
 
 }  // namespace bms

@@ -16,21 +16,30 @@
 namespace bms::boot {
 namespace {
 
-/// The marks of the slots of cell constants in recorded contents.
+/// The slots of cell constants in recorded contents.
 class RecordedCells final : public SlotFlash {
  public:
-  explicit RecordedCells(const Contents& contents) : contents_(contents) {}
+  explicit RecordedCells(Contents& contents) : contents_(contents) {}
   std::uint32_t slot_bytes() const override { return cell_slot_bytes; }
-  bool erase(std::uint8_t) override { return false; }
-  bool program(std::uint8_t, std::uint32_t, std::uint32_t) override { return false; }
+  bool erase(std::uint8_t slot) override {
+    std::ranges::fill(place(slot), std::uint8_t{0xFF});
+    return true;
+  }
+  bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
+    for (std::size_t k = 0; k < 4; ++k) place(slot)[at + k] &= static_cast<std::uint8_t>(word >> 8 * k);
+    return true;
+  }
   void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override {
-    std::ranges::copy(contents_.slot(Kind::cell, slot).subspan(at, into.size()), into.begin());
+    std::ranges::copy(place(slot).subspan(at, into.size()), into.begin());
   }
   std::uint32_t one_time(std::uint32_t) override { return ~0U; }
   bool program_one_time(std::uint32_t, std::uint32_t) override { return false; }
+  std::span<std::uint8_t> place(std::uint8_t slot) {
+    return std::span(contents_.slots).subspan(cell_slots[slot] - application_slots[0], cell_slot_bytes);
+  }
 
  private:
-  const Contents& contents_;
+  Contents& contents_;
 };
 
 /// Constants that were sent, in the slot of the same number.
@@ -222,38 +231,12 @@ TEST(CellUpdateOfTheBoard, ConfirmedConstantsThatAreDamagedLaterFallBackWithOneS
   EXPECT_TRUE(battery.board.flash.violations.empty());
 }
 
-/// Sets the marks of a slot of cell constants in contents.
-class PlantedCells final : public SlotFlash {
- public:
-  explicit PlantedCells(Contents& contents) : contents_(contents) {}
-  std::uint32_t slot_bytes() const override { return cell_slot_bytes; }
-  bool erase(std::uint8_t slot) override {
-    std::ranges::fill(place(slot), std::uint8_t{0xFF});
-    return true;
-  }
-  bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
-    for (std::size_t k = 0; k < 4; ++k) place(slot)[at + k] &= static_cast<std::uint8_t>(word >> 8 * k);
-    return true;
-  }
-  void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override {
-    std::ranges::copy(place(slot).subspan(at, into.size()), into.begin());
-  }
-  std::uint32_t one_time(std::uint32_t) override { return ~0U; }
-  bool program_one_time(std::uint32_t, std::uint32_t) override { return false; }
-  std::span<std::uint8_t> place(std::uint8_t slot) {
-    return std::span(contents_.slots).subspan(cell_slots[slot] - application_slots[0], cell_slot_bytes);
-  }
-
- private:
-  Contents& contents_;
-};
-
 TEST(CellUpdateOfTheBoard, ConstantsOnTrialThatCannotBeUsedGiveWayToTheConfirmedOnes) {
   const Updates& u = the_updates();
   Cut planted;
   planted.contents = u.before;
   for (std::size_t k = 0; k < u.sent[1].complete_at; ++k) planted.contents.apply(u.operations[k]);
-  PlantedCells cells(planted.contents);
+  RecordedCells cells(planted.contents);
   ASSERT_TRUE(read_marks(cells, 0).confirmed && !read_marks(cells, 1).complete);
   auto payloads = update::cell_payloads(better(1.2), files::read_cell("table9"));
   for (update::Payload& p : payloads) p.bytes.at(8 + 3 * 8) ^= 1;  // the last bit of limits.voltage_max_v
