@@ -126,5 +126,26 @@ TEST(PackCurrent, SaysNothingOfASignWithoutChangesOfTheCurrent) {
   EXPECT_FALSE(dp::reversed_current(load.current_a, load.voltage_v, 1));
 }
 
+/// Resistance and joint are so much alike that the size of one depends on what the other is.
+TEST(PackVerdict, AResistanceWhoseSigmaContainsZeroIsNotNamed) {
+  for (const dp::Cause cause : {dp::Cause::resistance, dp::Cause::joint, dp::Cause::capacity}) {
+    for (const double sigma : {0.03, 0.25}) {
+      dp::PackFinding f;
+      f.cause = cause;
+      f.cell = 2;
+      f.value = 0.2;
+      f.sigma = sigma;
+      f.probability = 1;
+      dp::PackDiagnosis d;
+      d.cells = 6;
+      d.findings = {f};
+      dp::conclude(d);
+      const bool named = sigma < 0.1 || cause == dp::Cause::capacity;
+      EXPECT_EQ(d.findings.size(), named ? 1 : 0) << sigma;
+      EXPECT_EQ(d.verdict, named ? diagnosis::Verdict::cause : diagnosis::Verdict::no_mismatch) << sigma;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace bms
