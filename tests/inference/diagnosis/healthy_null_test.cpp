@@ -165,8 +165,10 @@ TEST(HealthyNull, OneOrTwoBlocksRaiseNoMoreFalseAlarms) {
       }
       EXPECT_LE(alarms, 1.2 * 0.05 * trials) << blocks << " blocks, " << covered;
       // a cause that the blocks do not show, as large as the one that they show
-      if (blocks == 1) EXPECT_LE(of_another_cause, 1.2 * 0.05 * trials) << covered;
-      if (blocks == 1) EXPECT_GE(of_another_cause, 0.2 * 0.05 * trials) << "the rate is also used, " << covered;
+      if (blocks == 1) {
+        EXPECT_LE(of_another_cause, 1.2 * 0.05 * trials) << covered;
+        EXPECT_GE(of_another_cause, 0.2 * 0.05 * trials) << "the rate is also used, " << covered;
+      }
       EXPECT_GE(of_a_fault, 0.5 * trials) << blocks << " blocks, " << covered;
     }
   }
