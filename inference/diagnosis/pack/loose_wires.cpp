@@ -23,6 +23,7 @@ struct Pair {
   std::vector<std::size_t> row;
   std::vector<double> half_difference_v, sum_v, current_a;
   std::vector<double> before_v, after_v;  ///< the cells on both sides, against the others; NaN: none
+  std::vector<double> others_v;
 };
 
 /// Median of the cells other than c and c + 1 in this row.
@@ -48,29 +49,38 @@ Pair pair_of(const PackRecording& pack, std::size_t c) {
     p.current_a.push_back(pack.current_a[k]);
     p.before_v.push_back(c > 0 ? pack.cell_v[c - 1][k] - others : no_value);
     p.after_v.push_back(c + 2 < pack.cells() ? pack.cell_v[c + 2][k] - others : no_value);
+    p.others_v.push_back(others);
   }
   return p;
 }
 
-/// Changes from row to row without what goes with the current: the cells' resistances differ.
-std::vector<double> changes_of(const Pair& p, const std::vector<double>& of_v, double quiet_a) {
-  std::vector<double> changes = {0}, ratios;
+/// Without what goes with the current: the cells' resistances differ.
+std::vector<double> without_current(const Pair& p, std::vector<double> of_v, double quiet_a) {
+  std::vector<double> ratios;
   for (std::size_t k = 1; k < p.row.size(); ++k) {
-    const double di = p.current_a[k] - p.current_a[k - 1];
-    changes.push_back(of_v[k] - of_v[k - 1]);
-    if (std::abs(di) > quiet_a && std::isfinite(changes[k])) ratios.push_back(changes[k] / di);
+    const double di = p.current_a[k] - p.current_a[k - 1], dv = of_v[k] - of_v[k - 1];
+    if (std::abs(di) > quiet_a && std::isfinite(dv)) ratios.push_back(dv / di);
   }
-  if (ratios.size() < of_wires.least_steps) return changes;
+  if (ratios.size() < of_wires.least_steps) return of_v;
   const double ohm = measurement::median(ratios);
-  for (std::size_t k = 1; k < changes.size(); ++k) changes[k] -= ohm * (p.current_a[k] - p.current_a[k - 1]);
-  return changes;
+  for (std::size_t k = 0; k < of_v.size(); ++k) of_v[k] -= ohm * p.current_a[k];
+  return of_v;
+}
+
+/// By how much half the difference may be off because its two channels are read at different moments between the rows
+/// before and after: half of what the voltage does there.
+double unknown_moment(const Pair& p, std::size_t k) {
+  const auto first = p.others_v.begin() + static_cast<std::ptrdiff_t>(k > 0 ? k - 1 : 0);
+  const auto end = p.others_v.begin() + static_cast<std::ptrdiff_t>(std::min(k + 2, p.others_v.size()));
+  const auto [low, high] = std::minmax_element(first, end);
+  return (*high - *low) / 2;
 }
 
 /// The level of the summed leaps by row, and from which size on two levels differ.
 struct Levels {
   std::vector<double> of_row_v;
   double leap_v = 0;
-  std::size_t leaps = 0;
+  std::vector<double> leaps_v;  ///< sizes; none where they are not those of a contact
 };
 
 /// What else moves with the leaps, over their size: 0 at a bad wire.
@@ -107,38 +117,76 @@ double digit_of(const Pair& p) {
   return std::isfinite(digit_v) ? digit_v : 0;
 }
 
+/// Half the difference of a pair by row, and what it may be off.
+class Readings {
+ public:
+  Readings(const Pair& p, std::vector<double> half_v) : half_v_(std::move(half_v)) {
+    for (std::size_t k = 0; k < half_v_.size(); ++k) unknown_v_.push_back(unknown_moment(p, k));
+    std::vector<double> sizes_v;
+    for (std::size_t k = 1; k < half_v_.size(); ++k) sizes_v.push_back(std::abs(half_v_[k] - half_v_[k - 1]));
+    const double sigma_v = measurement::median(sizes_v) / abs_median_of_normal;
+    leap_v_ = std::max({of_wires.least_v, of_wires.sigmas * sigma_v, of_wires.digits * digit_of(p)});
+  }
+
+  double leap_v() const { return leap_v_; }
+  double between(std::size_t from, std::size_t to) const { return half_v_[to] - half_v_[from]; }
+  /// From a row that is known to have the level.
+  bool is_leap(std::size_t from, std::size_t to) const {
+    return std::abs(between(from, to)) > leap_v_ + unknown_v_[to];
+  }
+  bool is_same(std::size_t from, std::size_t to) const { return std::abs(between(from, to)) <= leap_v_; }
+  /// Two rows that lie nearer together than either is to another one.
+  bool are_together(std::size_t a, std::size_t b, std::size_t other) const {
+    return std::abs(between(a, b)) < of_wires.same_level * std::abs(between(other, a)) + leap_v_ / 2;
+  }
+
+ private:
+  std::vector<double> half_v_, unknown_v_;
+  double leap_v_ = 0;
+};
+
 Levels levels_of(const Pair& p, double quiet_a) {
   Levels levels;
-  const std::vector<double> steps_v = changes_of(p, p.half_difference_v, quiet_a),
-                            sums_v = changes_of(p, p.sum_v, quiet_a), before_v = changes_of(p, p.before_v, quiet_a),
-                            after_v = changes_of(p, p.after_v, quiet_a);
-  std::vector<double> sizes_v;
-  for (const double v : steps_v) sizes_v.push_back(std::abs(v));
-  const double sigma_v = measurement::median(sizes_v) / abs_median_of_normal;
-  levels.leap_v = std::max({of_wires.least_v, of_wires.sigmas * sigma_v, of_wires.digits * digit_of(p)});
+  const Readings readings(p, without_current(p, p.half_difference_v, quiet_a));
+  const std::vector<double> sum_v = without_current(p, p.sum_v, quiet_a),
+                            before_v = without_current(p, p.before_v, quiet_a),
+                            after_v = without_current(p, p.after_v, quiet_a);
+  levels.leap_v = readings.leap_v();
+  levels.of_row_v.assign(p.row.size(), 0);
   double level_v = 0;
   std::vector<double> known_v = {0};
   Along sum, before, after;
-  double moving = 0, moving_leaps = 0;  // rows in which the current steps
-  for (std::size_t k = 0; k < p.row.size(); ++k) {
-    const double leap_v = steps_v[k];
-    const bool moves = k > 0 && std::abs(p.current_a[k] - p.current_a[k - 1]) > quiet_a;
-    moving += moves ? 1 : 0;
-    if (std::abs(leap_v) > levels.leap_v && std::abs(sums_v[k]) < of_wires.single_cell * std::abs(leap_v)) {
-      moving_leaps += moves ? 1 : 0;
-      sum.add(leap_v, sums_v[k]);
-      before.add(leap_v, before_v[k]);
-      after.add(leap_v, after_v[k]);
-      level_v =
-          known_level(known_v, level_v + leap_v, std::max(levels.leap_v / 2, of_wires.same_level * std::abs(leap_v)));
-      ++levels.leaps;
+  std::size_t last = 0;  // row that has the level
+  std::vector<double> odd_v;
+  for (std::size_t k = 1; k < p.row.size(); ++k) {
+    levels.of_row_v[k] = level_v;
+    // a contact stays bad for more than a row: what the load does between two channels is gone in the next one
+    const bool stays = k + 1 < p.row.size() && readings.are_together(k, k + 1, last);
+    const bool leaps = readings.is_leap(last, k) && stays;
+    const double leap_v = readings.between(last, k), along_v = sum_v[k] - sum_v[last];
+    if (!leaps && !readings.is_same(last, k)) {
+      if (!stays) odd_v.push_back(std::abs(leap_v));
+      continue;
     }
-    levels.of_row_v.push_back(level_v);
+    if (leaps && std::abs(along_v) < of_wires.single_cell * std::abs(leap_v)) {
+      sum.add(leap_v, along_v);
+      before.add(leap_v, before_v[k] - before_v[last]);
+      after.add(leap_v, after_v[k] - after_v[last]);
+      const double within_v = std::max(levels.leap_v / 2, of_wires.same_level * std::abs(leap_v));
+      level_v = known_level(known_v, level_v + leap_v, within_v);
+      levels.leaps_v.push_back(std::abs(leap_v));
+      for (std::size_t j = last + 1; j <= k; ++j) {
+        if (std::abs(readings.between(j, k)) < std::abs(readings.between(last, j))) levels.of_row_v[j] = level_v;
+      }
+    }
+    last = k;
   }
-  // a wire does not know of the current: leaps that come with its steps are those of resistances and delays
-  const double usual = moving / static_cast<double>(p.row.size());
-  const bool by_current = moving_leaps > (usual + of_wires.more_with_current) * static_cast<double>(levels.leaps);
-  if (by_current || std::max({sum.share(), before.share(), after.share()}) > of_wires.most_along) levels.leaps = 0;
+  // where single rows are odd by as much more often, two of them are alike by chance
+  const double usual_v = levels.leaps_v.empty() ? 0 : measurement::median(levels.leaps_v);
+  const auto odd = static_cast<std::size_t>(
+      std::count_if(odd_v.begin(), odd_v.end(), [&](double v) { return v > (1 - of_wires.same_level) * usual_v; }));
+  const double along = std::max({sum.share(), before.share(), after.share()});
+  if (odd > levels.leaps_v.size() || along > of_wires.most_along) levels.leaps_v.clear();
   return levels;
 }
 
@@ -155,19 +203,15 @@ double usual_level(const Levels& levels) {
   return most->second.second / static_cast<double>(most->second.first);
 }
 
-PackFinding finding_of(const PackRecording& pack, const Pair& p, std::size_t c, const std::vector<double>& off_v,
-                       const std::vector<char>& bad) {
+PackFinding finding_of(const PackRecording& pack, const Pair& p, std::size_t c, const std::vector<char>& bad,
+                       std::vector<double> leaps_v) {
   PackFinding f;
   f.cause = Cause::sense_wire;
   f.cell = c;
   f.probability = 1;
-  std::vector<double> sizes;
-  for (std::size_t k = 0; k < bad.size(); ++k) {
-    if (bad[k] != 0) sizes.push_back(std::abs(off_v[k]));
-  }
-  f.value = measurement::median(sizes);
-  for (double& v : sizes) v = std::abs(v - f.value);
-  f.sigma = std::max(measurement::median(sizes), of_wires.least_sigma_v);
+  f.value = measurement::median(leaps_v);
+  for (double& v : leaps_v) v = std::abs(v - f.value);
+  f.sigma = std::max(measurement::median(leaps_v) / abs_median_of_normal, of_wires.least_sigma_v);
   const auto stretches = measurement::consecutive_rows(bad.size(), [&](std::size_t k) { return bad[k] != 0; });
   std::string times;
   const double start_s = pack.time_s.front();
@@ -175,8 +219,9 @@ PackFinding finding_of(const PackRecording& pack, const Pair& p, std::size_t c, 
     times += fmt::format("{}{:.0f} to {:.0f} s", k == 0 ? "" : ", ", pack.time_s[p.row[stretches[k].begin]] - start_s,
                          pack.time_s[p.row[stretches[k].end - 1]] - start_s);
   if (stretches.size() > of_wires.named) times += fmt::format(" and {} more times", stretches.size() - of_wires.named);
-  f.because = fmt::format("Its contact is intermittent: bad in {:.1f} % of the rows, from {}. The rows are left out.",
-                          100 * static_cast<double>(sizes.size()) / static_cast<double>(pack.rows()), times);
+  f.because = fmt::format(
+      "Its contact is intermittent: bad in {:.1f} % of the rows, from {}. The rows are left out.",
+      100 * static_cast<double>(std::count(bad.begin(), bad.end(), 1)) / static_cast<double>(pack.rows()), times);
   return f;
 }
 
@@ -188,17 +233,13 @@ std::vector<LooseWire> take_loose_wires(PackRecording& pack, double quiet_a) {
     const Pair p = pair_of(pack, c);
     if (p.row.size() < of_wires.least_rows) continue;
     const Levels levels = levels_of(p, quiet_a);
-    if (levels.leaps == 0) continue;
+    if (levels.leaps_v.empty()) continue;
     const double usual_v = usual_level(levels);
     std::vector<char> bad;
-    std::vector<double> off_v;
-    for (const double v : levels.of_row_v) {
-      off_v.push_back(v - usual_v);
-      bad.push_back(std::abs(v - usual_v) > levels.leap_v / 2 ? 1 : 0);
-    }
+    for (const double v : levels.of_row_v) bad.push_back(std::abs(v - usual_v) > levels.leap_v / 2 ? 1 : 0);
     const auto rows = static_cast<std::size_t>(std::count(bad.begin(), bad.end(), 1));
-    if (rows < (levels.leaps == 1 ? of_wires.rows_of_one_leap : of_wires.rows)) continue;
-    wires.push_back({c, rows, finding_of(pack, p, c, off_v, bad)});
+    if (rows < (levels.leaps_v.size() == 1 ? of_wires.rows_of_one_leap : of_wires.rows)) continue;
+    wires.push_back({c, rows, finding_of(pack, p, c, bad, levels.leaps_v)});
     for (std::size_t k = 0; k < bad.size(); ++k) {
       if (bad[k] != 0) pack.cell_v[c][p.row[k]] = pack.cell_v[c + 1][p.row[k]] = no_value;
     }

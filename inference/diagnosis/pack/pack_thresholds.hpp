@@ -200,9 +200,8 @@ struct PackThresholds {
     double least_digit_v = 1e-6;  ///< less is how a double is rounded
     double single_cell = 0.5;     ///< change of the sum over the leap: it is 1 if one cell's channel alone leaps
     double most_along = 0.15;  ///< by which sum or the next cells change with the leaps; balancing: by a third or more
-    double least_sigma_v = 0.0005;    ///< of a size
-    double same_level = 0.25;         ///< of the leap: such levels are one
-    double more_with_current = 0.25;  ///< share of the leaps, more than of all rows, in which the current steps
+    double least_sigma_v = 0.0005;  ///< of a size
+    double same_level = 0.25;       ///< of the leap: such levels are one
     std::size_t least_rows = 30, least_steps = 8;
     std::size_t rows = 5, rows_of_one_leap = 20;  ///< that are bad, at least: fewer are single odd readings
     std::size_t named = 3;                        ///< stretches with their times

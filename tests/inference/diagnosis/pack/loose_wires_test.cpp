@@ -120,6 +120,45 @@ TEST(LooseWires, AreNotSeenInHealthyPacksBalancersAndSingleOddReadings) {
   }
 }
 
+/// Rows of seconds, channels read one after the other, a current that is read once: a pulse or a step of the load lies
+/// between two channels of a row, one reads what was before and the next what was after, and the current knows neither.
+TEST(LooseWires, AreNotStepsOfTheLoadBetweenTheChannelsOfARow) {
+  std::size_t found = 0;
+  for (unsigned seed = 1; seed <= 40; ++seed) {
+    const std::size_t cells = 3 + seed % 6;
+    dp::PackRecording pack = pack_of(cells, seed, [](std::size_t, std::vector<double>&) {});
+    std::mt19937 random(1'000 + seed);
+    std::uniform_real_distribution<double> moment(-0.5, 0.5 + 0.7 * static_cast<double>(cells));
+    std::normal_distribution<double> noise(0, 1);
+    double before_a = 0;
+    for (std::size_t k = 0; k < rows; ++k) {
+      const double now_a = k % 6 != 0 ? 5.0 * std::round(2 * noise(random)) : before_a;
+      // the current is read first, then a channel at a time; the rest of a row nobody reads
+      const double step_at = moment(random);
+      const double pulse_a = k % 5 == 0 ? 15 * noise(random) : 0, pulse_at = moment(random);
+      for (std::size_t c = 0; c < cells; ++c) {
+        const double at = 1 + static_cast<double>(c);
+        const double channel_a = (at < step_at ? before_a : now_a) + (std::abs(at - pulse_at) < 1.2 ? pulse_a : 0);
+        pack.cell_v[c][k] = std::round((pack.cell_v[c][k] + 0.0015 * (channel_a - pack.current_a[k])) * 1e3) / 1e3;
+      }
+      pack.current_a[k] = step_at > 0 ? before_a : now_a;
+      before_a = now_a;
+    }
+    dp::PackRecording with_wire = pack;
+    for (std::size_t k = 0; k < rows; k += k % 97 == 29 ? 68 : 1) {
+      with_wire.cell_v[0][k] += 0.3;
+      with_wire.cell_v[1][k] -= 0.3;
+    }
+    EXPECT_TRUE(wires_in(pack).empty()) << cells << " cells, " << seed;
+    const auto wires = wires_in(with_wire);
+    found += wires.size() == 1 && wires[0].cell == 0 &&
+                     std::abs(wires[0].finding.value - 0.3) < 2 * wires[0].finding.sigma + 0.001
+                 ? 1
+                 : 0;
+  }
+  EXPECT_GE(found, 38U) << "a wire among such rows";
+}
+
 TEST(LooseWires, AreNotTheDigitsOfACoarseReading) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     for (const double digit_v : {0.002, 0.005, 0.01, 0.02}) {
