@@ -87,10 +87,12 @@ Start choose(SlotFlash& flash, const Battery& battery, bool power_on, bool may_t
       refusal = Refusal::trial_failed;
     }
     if (refusal == Refusal::none) refusal = check_slot(flash, battery, slot, start.header, check_header);
+    // a trial that no mark counts would not end
+    const bool counted = refusal != Refusal::none || m.confirmed || set_trial(flash, slot, m.trials);
+    if (!counted) refusal = Refusal::flash_failed;
     if (refusal == Refusal::none) {
       settle(flash, slot, m, start.header);
       start.trial = !m.confirmed;
-      if (start.trial) set_trial(flash, slot, m.trials);
       start.slot = slot;
       start.found = true;
       return start;
