@@ -169,7 +169,8 @@ std::vector<PackLimit> detection_limits_of(const Matrix& information, const Vect
     const double constant = gain_at(0), of_example = gain_at(example_of(cause, r0_ohm)) - constant;
     if (!(of_example > 0)) continue;
     const double size = example_of(cause, r0_ohm) * std::sqrt((likelihood.least_gain() - constant) / of_example);
-    const double limit = std::max({least, size, significant_size(d, cause, r0_ohm)});
+    const double sampling = cause == Cause::late ? least : 0;
+    const double limit = std::max({least, size, sampling + significant_size(d, cause, r0_ohm)});
     if (limit <= largest_size(cause, r0_ohm)) list.push_back({cause, limit});
   }
   return list;

@@ -201,7 +201,9 @@ double PackLikelihood::least_gain() const {
 bool PackLikelihood::is_possible(const Accusation& a, const Estimated& size) const {
   const auto p = static_cast<Eigen::Index>(parameter_of(a.cause));
   if (only_positive(a.cause) && size.value < 0) return false;
-  return std::abs(size.value) > least_[p] && std::abs(size.value) > limits.least_sigmas * size.sigma;
+  // less than the least delay is how the channels are sampled: no lateness at all, so it must lie beyond for certain
+  const double sampling = a.cause == Cause::late ? least_[p] : 0;
+  return std::abs(size.value) > least_[p] && std::abs(size.value) - sampling > limits.least_sigmas * size.sigma;
 }
 
 Vector healthy_spread(const std::vector<CellFit>& fits, double r0_ohm) {

@@ -113,7 +113,7 @@ struct PackThresholds {
     double late_rows = 1.5;        ///< from which on a lag is certain
     double grouped_share = 0.25;   ///< more channels than that are a group that is read later
     double least_rows_late = 0.5;  ///< of a delay that is named: less is a matter of the sampling
-    double staggered_s = 0.07;     ///< spread of sampling times that is reported
+    double staggered_rows = 0.07;  ///< spread of sampling times that is reported: cells that differ look like less
     double staggered_sigmas = 6;   ///< the same over its standard deviation
     double missing_share = 0.2;    ///< of readings
     double step_c = 0.05;          ///< [C] step of the current for an apparent resistance
@@ -130,7 +130,6 @@ struct PackThresholds {
     double least_seen = 0.1, most_seen = 0.97;  ///< of the steps, by the usual channel
     std::size_t parts = 20;                     ///< of the jackknife
     double rows_after = 1.5;                    ///< from a step to the row after its own, on average
-    double unknown = 0.5;                       ///< relative error if the steps do not stand alone
   } sampling_times;
 
   /// Of a cell with more resistance.

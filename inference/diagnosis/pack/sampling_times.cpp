@@ -93,8 +93,7 @@ double span_of(std::vector<double> delays_s) {
 bool steps_stand_alone(const Track& track, const PackRecording& pack) { return !lone_steps(track, pack).empty(); }
 
 Estimated span_within_row(double linear_s, double step_s) {
-  const double longest_s = std::max(linear_s, step_s), width_s = longest_s - linear_s;
-  return {(linear_s + longest_s) / 2, std::max(width_s * sigma_of_uniform, of_times.unknown * (linear_s - step_s))};
+  return {(linear_s + step_s) / 2, (step_s - linear_s) * sigma_of_uniform};
 }
 
 Estimated span_of_readings(const Estimated& one_step) {
@@ -130,10 +129,12 @@ std::optional<PackFinding> staggered_channels(const Track& track, const PackReco
   }
   if (delays.size() < limits.unexplained.cells) return std::nullopt;
   const double sigma = measurement::median(sigmas);
-  if (spread < limits.channels.staggered_s || spread < limits.channels.staggered_sigmas * sigma) return std::nullopt;
+  const double least_s = limits.channels.staggered_rows * track.step_s, linear_s = span_of(delays);
+  if (spread < std::max(least_s, limits.channels.staggered_sigmas * sigma)) return std::nullopt;
+  // a scan of the channels ends within its row: what lies further apart has another reason
+  if (linear_s > track.step_s) return std::nullopt;
   PackFinding f;
   f.cause = Cause::staggered;
-  const double linear_s = span_of(delays);
   const std::optional<Estimated> of_steps = sampling_span(track, pack, cells);
   const Estimated span = pack.single_readings ? span_of_readings(of_steps.value_or(Estimated{linear_s, 0}))
                                               : of_steps.value_or(span_within_row(linear_s, track.step_s));

@@ -24,7 +24,7 @@ double span_of(std::vector<double> delays_s);
 bool steps_stand_alone(const Track& track, const PackRecording& pack);
 
 /// What is known if only the delays of a linear fit are: where several steps lie in a row they are too small, and the
-/// channels are read within a row of step_s. Every time between is as probable.
+/// channels are read within a row of step_s >= linear_s. Every time between is as probable.
 Estimated span_within_row(double linear_s, double step_s);
 
 /// The same of single readings of the current: that they are equal does not show that the current was constant between

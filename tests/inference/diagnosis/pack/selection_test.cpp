@@ -50,6 +50,20 @@ TEST(PackSelection, FindsAWireNextToAnErrorOfTheNextChannel) {
   EXPECT_EQ(wires, 1);
 }
 
+/// Less than half a row is how the channels are read, so a lateness has to lie beyond it for certain.
+TEST(PackSelection, ADelayOfHalfARowIsNoLateChannel) {
+  const std::vector<dp::CellFit> fits = cells_with_errors({0, 0, 0, 0});
+  for (const double row_s : {1.0, 10.0}) {
+    const dp::PackLikelihood likelihood(fits, dp::least_spread(r0_ohm), r0_ohm, 1, row_s);
+    const dp::Accusation late{dp::Cause::late, 1}, wire{dp::Cause::sense_wire, 1};
+    EXPECT_FALSE(likelihood.is_possible(late, {0.51 * row_s, 0.04 * row_s}));
+    EXPECT_TRUE(likelihood.is_possible(late, {0.7 * row_s, 0.04 * row_s}));
+    EXPECT_TRUE(likelihood.is_possible(late, {-0.7 * row_s, 0.04 * row_s}));
+    EXPECT_FALSE(likelihood.is_possible(late, {1.2 * row_s, 0.3 * row_s})) << "not certain at all";
+    EXPECT_TRUE(likelihood.is_possible(wire, {0.006, 0.001})) << "of other causes the least size is not a boundary";
+  }
+}
+
 TEST(PackSelection, AccusesNoChannelTwice) {
   const std::vector<dp::CellFit> fits = cells_with_errors({0, 0.0005, 0, -0.015, 0.04, 0, 0, -0.0005, 0, 0});
   const dp::PackLikelihood likelihood(fits, dp::least_spread(r0_ohm), r0_ohm, 1, 1);
