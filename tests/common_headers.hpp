@@ -1,5 +1,5 @@
 // What most tests include, compiled once for all of them (tests/CMakeLists.txt). Each test includes what it uses: this
-// file is never included by name.
+// file is never included by name. Without sanitizers common_instances.hpp goes with it.
 #pragma once
 
 #include <algorithm>

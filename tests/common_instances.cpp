@@ -1,0 +1,3 @@
+#include "tests/common_instances.hpp"
+
+BMS_COMMON_INSTANCES(template)
