@@ -117,7 +117,7 @@ class Application {
     if constexpr (requires { requires Board::may_stop; }) {
       if (!truck_.park(pack, inputs, charger, protection_.decision(), board_, Board::plan())) return;
       shut_down();
-      hal::switch_off();
+      if (truck_.still_parked(board_.truck)) hal::switch_off();
     }
   }
 
@@ -381,7 +381,7 @@ class Application {
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
   float capacity_ah_ = 0;
-  TruckSide<may_switch_off<Board>> truck_;
+  TruckSide<has_ship_mode<Board>> truck_;
   Commands commands_;
   struct NoParameters {};
   [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;

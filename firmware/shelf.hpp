@@ -9,11 +9,13 @@
 // The driver's key or the charger's plug switches it on again. While its supply does not fall, the minute begins again.
 //
 // Only in a build with BMS_SWITCHES_OFF, because it takes a wiring that no firmware can check: without REG1 of the
-// front end in the supply the core goes on without readings, and without TS2 at key and plug nothing ends SHUTDOWN. If
-// TS2 is low at the command although key and plug are off, the BQ76952 waits, with its outputs off, until that ends.
+// front end in the supply the core starts again and goes on without readings, and without TS2 at key and plug nothing
+// ends SHUTDOWN. Key, plug and bus are read again right before the command. What comes in the microseconds after that
+// reading holds the BQ76952 on, with its outputs off; then chip and core are reset (hal/sleep.hpp).
 #pragma once
 
 #include <cstdint>
+#include <utility>
 
 #include "measurement/sample.hpp"
 
@@ -34,7 +36,7 @@ class Shelf {
   }
 
   /// Returns true if the battery is to be switched off now. used: anything but rest with open contactors; silent: the
-  /// bus; ready: hal::may_switch_off().
+  /// bus; ready: hal::load_side_discharged().
   constexpr bool update(std::int32_t lowest_cell_uv, std::int32_t empty_uv, bool used, bool silent, bool ready,
                         std::uint64_t now_us) {
     used_ = used;
@@ -43,14 +45,17 @@ class Shelf {
     if (!counting_) since_us_ = now_us;
     counting_ = low || shipping_;
     if (!counting_ || !ready || now_us - since_us_ < (shipping_ ? answer_us : low_for_us)) return false;
-    shipping_ = false;
+    commanded_ = std::exchange(shipping_, false);
     since_us_ = now_us;
     return true;
   }
 
+  /// The last update() that returned true did so for the command.
+  [[nodiscard]] constexpr bool commanded() const { return commanded_; }
+
  private:
   std::uint64_t since_us_ = 0;
-  bool counting_ = false, shipping_ = false, used_ = true;
+  bool counting_ = false, shipping_ = false, used_ = true, commanded_ = false;
 };
 
 }  // namespace bms::firmware

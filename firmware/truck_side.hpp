@@ -20,12 +20,12 @@ namespace bms::firmware {
 
 /// Board::switches_off: build option BMS_SWITCHES_OFF (firmware/shelf.hpp).
 template <class Board>
-inline constexpr bool may_switch_off = requires {
+inline constexpr bool has_ship_mode = requires {
   requires Board::switches_off;
 };
 
-/// SwitchesOff: may_switch_off of the board.
-template <bool SwitchesOff>
+/// ShipMode: has_ship_mode of the board.
+template <bool ShipMode>
 class TruckSide {
  public:
   /// Call once per sample. fitted: bits of parameters::Parameter::inputs_fitted.
@@ -74,7 +74,7 @@ class TruckSide {
   std::optional<std::uint32_t> command(const can::Command& command, bool closed, May&& may) {
     using A = can::CommandAnswer;
     if (command.code != can::Command::code_switch_off) return std::nullopt;
-    if constexpr (!SwitchesOff) return A::result_refused;
+    if constexpr (!ShipMode) return A::result_refused;
     if (command.argument != 0) return A::result_refused;
     if (!may(Privilege::service)) return A::result_not_authorised;
     return !closed && shelf_.ship() ? A::result_done : A::result_refused;
@@ -90,7 +90,7 @@ class TruckSide {
     const bool wanted = inputs.request != protection::Request::none || charger.present ||
                         decision.outputs.any_closed() || board.truck.is_on(hal::TruckInput::key);
     hal::set_parked(!wanted && board.insulation.ohm == measurement::no_reading);
-    if constexpr (!SwitchesOff) {
+    if constexpr (!ShipMode) {
       return false;
     } else {
       const std::int32_t rest_ua = plan.contactors.rest_ua;
@@ -100,8 +100,20 @@ class TruckSide {
                           inputs.auxiliary.main_minus_closed;
       const std::int32_t lowest_uv = *std::ranges::min_element(pack.cell_uv);  // no_reading is the lowest value
       return shelf_.update(lowest_uv, plan.rule(protection::Fault::cell_undervoltage).release,
-                           wanted || !rests || closed, !hal::can_listening(), hal::may_switch_off(), pack.time_us);
+                           wanted || !rests || closed, !hal::can_listening(), hal::load_side_discharged(),
+                           pack.time_us);
     }
+  }
+
+  /// Reads again what park() has read at the begin of its sample: storing the state has taken milliseconds. truck: the
+  /// inputs of that sample. A node that has begun to talk counts as in park(), not for a workshop's command.
+  bool still_parked(hal::TruckInputs truck) const {
+    if constexpr (ShipMode) {
+      truck.on = hal::truck_inputs().on;
+      if (truck.is_on(hal::TruckInput::key) || truck.is_on(hal::TruckInput::charger_plug)) return false;
+      return shelf_.commanded() || !(hal::can_listening() || hal::bus_stirs());
+    }
+    return false;
   }
 
  private:
@@ -111,7 +123,7 @@ class TruckSide {
   struct Never {
     bool ship() const { return false; }
   };
-  [[no_unique_address]] std::conditional_t<SwitchesOff, Shelf, Never> shelf_;
+  [[no_unique_address]] std::conditional_t<ShipMode, Shelf, Never> shelf_;
 };
 
 }  // namespace bms::firmware

@@ -14,12 +14,16 @@ inline constexpr std::uint64_t silence_before_stop_us = 10'000'000;
 /// Call once per sample. parked: all contactors are open, and nobody asks for power.
 void set_parked(bool parked);
 
-/// switch_off() would act at once: the truck's side of main plus has no voltage, which holds the measuring chip on.
-bool may_switch_off();
+/// The truck's side of main plus has no voltage, which would hold the measuring chip on.
+bool load_side_discharged();
 
-/// Switches the measuring chip off, and with it the supply of this core where it is wired so, unless key or plug keep
-/// it on. Only of a build with BMS_SWITCHES_OFF (firmware/shelf.hpp). The stored state is complete before. Returns,
-/// because the supply does not fall at once.
+/// A node has begun a frame since the chip stopped last. The frame itself is lost.
+bool bus_stirs();
+
+/// Switches the measuring chip off, and with it the supply of this core where it is wired so. Only of a build with
+/// BMS_SWITCHES_OFF (firmware/shelf.hpp). The stored state is complete before, and all contactors are open. If key or
+/// plug keep the chip on, or the supply does not fall, it resets chip and core, which start as by a key: a back end
+/// that has such a chip does not return.
 void switch_off();
 
 /// Returns with the next interrupt, at the latest at due_us [us, hal::now_us()].

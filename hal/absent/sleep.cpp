@@ -3,7 +3,8 @@
 namespace bms::hal {
 
 void set_parked(bool) {}
-bool may_switch_off() { return false; }
+bool load_side_discharged() { return false; }
+bool bus_stirs() { return false; }
 void switch_off() {}
 
 }  // namespace bms::hal

@@ -67,6 +67,16 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   if (trips_ != 0) ++counters_.trips;
 }
 
+/// A chip that is held on keeps its outputs off until it is reset. Its settings are those of before, so only POR shows
+/// that it was.
+FrontEnd::AfterShutdown FrontEnd::after_shut_down() {
+  std::uint16_t status = 0;
+  if (!wire_.detect(status)) return AfterShutdown::off;
+  if ((status & was_reset) != 0) return AfterShutdown::restarted;
+  static_cast<void>(wire_.select(reset));
+  return AfterShutdown::held_on;
+}
+
 /// One step towards measuring. Returns false if the chip is missing or not as expected.
 bool FrontEnd::advance() {
   switch (state_) {

@@ -74,6 +74,10 @@ class FrontEnd {
   void shut_down() {
     for (int k = 0; k < 2; ++k) static_cast<void>(wire_.select(shutdown));
   }
+  /// off: no answer. held_on: TS2 is low or LD high; it has received RESET. restarted: by TS2, or by that reset.
+  enum class AfterShutdown : std::uint8_t { off, held_on, restarted };
+  /// Call after shut_down(), as long as this core has a supply.
+  AfterShutdown after_shut_down();
 
   /// SecondLineTrip bits of the last read().
   std::uint32_t trips() const { return trips_; }

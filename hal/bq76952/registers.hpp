@@ -35,7 +35,7 @@ inline constexpr std::uint8_t dchg_asserted = 1U << 4, ddsg_asserted = 1U << 5;
 
 // subcommands [12.2, 12.3]
 inline constexpr std::uint16_t get_device_number = 0x0001, get_currents = 0x0075, get_charge = 0x0076,
-                               exit_deep_sleep = 0x000E, shutdown = 0x0010, balance_cells = 0x0083,
+                               exit_deep_sleep = 0x000E, shutdown = 0x0010, reset = 0x0012, balance_cells = 0x0083,
                                set_config_update = 0x0090, exit_config_update = 0x0092, sleep_disable = 0x009A,
                                recover_short_circuit_latch = 0x009C, swap_comm_mode = 0x29BC;
 

@@ -19,9 +19,11 @@
 #include "hal/contactor_pins.hpp"
 #include "hal/frame_dispatch.hpp"
 #include "hal/i2c.hpp"
+#include "hal/power.hpp"
 #include "hal/power_path.hpp"
 #include "hal/second_line.hpp"
 #include "hal/sleep.hpp"
+#include "hal/watchdog.hpp"
 
 namespace bms::hal {
 
@@ -58,6 +60,7 @@ class OneChip {
   /// Voltage at LD; measurement::no_reading if unknown.
   std::int32_t dc_link_uv() const { return chip_.dc_link_uv(); }
   void shut_down() { chip_.shut_down(); }
+  FrontEnd::AfterShutdown after_shut_down() { return chip_.after_shut_down(); }
   /// cells: one bit per cell of the pack.
   void bleed(std::uint32_t cells) { chip_.bleed(inputs_of(board_configuration, cells)); }
 
@@ -111,11 +114,26 @@ FrontEndHealth front_end_health() { return front_end.health(); }
 
 /// With LD above its threshold (0.8 V or more assumed, 1.45 V typical: E2E 1356033) the chip would wait with its
 /// outputs off, and its pins would contradict the protections.
-bool may_switch_off() {
+bool load_side_discharged() {
   constexpr std::int32_t low_uv = 700'000;
   return front_end.dc_link_uv() != measurement::no_reading && front_end.dc_link_uv() < low_uv;
 }
-void switch_off() { front_end.shut_down(); }
+
+/// A chip that refuses to be reset waits until TS2 is open again, and then takes the supply away. Until then all
+/// contactors are open, by this core and by the chip's outputs, and the next key-on is a start like any other.
+void switch_off() {
+  using enum FrontEnd::AfterShutdown;
+  constexpr std::uint64_t ask_again_us = 250'000, supply_falls_us = 1'000'000;
+  front_end.shut_down();
+  for (std::uint64_t asked_us = now_us(), answered_us = asked_us;;) {
+    while (now_us() - asked_us < ask_again_us) wait_for_interrupt();
+    asked_us = now_us();
+    watchdog_feed();
+    const FrontEnd::AfterShutdown chip = front_end.after_shut_down();
+    if (chip == held_on) answered_us = asked_us;
+    if (chip == restarted || asked_us - answered_us > supply_falls_us) finish(0);
+  }
+}
 
 void power_path_set(const PowerPath& wanted) {
   contactor_pins_set(wanted);

@@ -89,6 +89,13 @@ void Stack::shut_down() {
   for (Half& half : halves_) half.chip.shut_down();
 }
 
+FrontEnd::AfterShutdown Stack::after_shut_down() {
+  using enum FrontEnd::AfterShutdown;
+  const auto below = halves_[lower].chip.after_shut_down(), above = halves_[upper].chip.after_shut_down();
+  if (below == held_on || above == held_on) return held_on;
+  return below == restarted ? below : above;
+}
+
 void Stack::bleed(std::uint32_t cells) {
   halves_[lower].wanted = cells & ((1U << cells_below) - 1);
   halves_[upper].wanted = cells >> cells_below;

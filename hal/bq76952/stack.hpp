@@ -50,6 +50,8 @@ class Stack {
   /// The higher one of both chips' LD; measurement::no_reading if one is unknown.
   std::int32_t dc_link_uv() const;
   void shut_down();
+  /// held_on: at least one of the chips; restarted: at least one, and none is held on.
+  FrontEnd::AfterShutdown after_shut_down();
   /// cells: one bit per cell of the pack. A chip that is not in its place gets none.
   void bleed(std::uint32_t cells);
 

@@ -156,6 +156,7 @@ void end_listening() {
 }  // namespace
 
 void set_parked(bool now) { parked = now; }
+bool bus_stirs() { return off_the_bus && (exti_pr() & receive_line) != 0; }
 
 void rest_until(std::uint64_t due_us) {
   const std::uint64_t now = now_us();

@@ -88,7 +88,8 @@ void truck_outputs_set(std::uint32_t outputs) { host_hal::truck_outputs = output
 Insulation insulation() { return host_hal::insulation; }
 std::int32_t second_current_ua() { return host_hal::second_current_reading_ua; }
 void set_parked(bool parked) { host_hal::parked = parked; }
-bool may_switch_off() { return host_hal::load_side_empty; }
+bool load_side_discharged() { return host_hal::load_side_empty; }
+bool bus_stirs() { return false; }
 void switch_off() { ++host_hal::switched_off; }
 ResetCause reset_cause() { return host_hal::cause; }
 std::optional<FaultRecord> last_fault() { return host_hal::fault; }

@@ -5,7 +5,9 @@
 
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
+#include "hal/power.hpp"
 #include "hal/sleep.hpp"
+#include "hal/watchdog.hpp"
 
 namespace bms {
 
@@ -21,6 +23,7 @@ constexpr hal::bq76952::Configuration hal::bq76952::board_configuration =
 Bq76952Model* chip = nullptr;
 std::vector<can::Frame> arriving;
 std::vector<hal::PowerPath> switched;
+std::vector<std::uint64_t> feeds_us;
 
 ChipVariant variant_under_test() {
   const char* wanted = std::getenv("BMS_CHIP_VARIANT");
@@ -50,6 +53,8 @@ bool can_receive(can::Frame& frame) {
   return true;
 }
 void contactor_pins_set(const PowerPath& wanted) { switched.push_back(wanted); }
+void watchdog_feed() { feeds_us.push_back(now_us()); }
+void finish(int) { throw RunEnded{}; }
 }  // namespace hal
 
 }  // namespace bms

@@ -29,6 +29,10 @@ extern Bq76952Model* chip;                    ///< at the end of the I2C bus; se
 extern std::vector<can::Frame> arriving;      ///< frames that can_receive() returns
 extern std::vector<hal::PowerPath> switched;  ///< arguments of contactor_pins_set()
 
+extern std::vector<std::uint64_t> feeds_us;  ///< times of watchdog_feed()
+/// What finish() throws.
+struct RunEnded {};
+
 /// The chip that the environment variable BMS_CHIP_VARIANT names, or the nominal one. An unknown name ends the program
 /// with a list of the names.
 ChipVariant variant_under_test();

@@ -85,7 +85,7 @@ bool Bq76952Model::control_command(std::uint16_t address) {
       ending_ = !shutdown_;
       return true;
     case 0x0012:  // RESET
-      if (!sealed) reset();
+      if (!sealed && !ignores_reset) reset();
       return true;
     case 0x0082:  // RESET_PASSQ
       measurement_.restart_charge();

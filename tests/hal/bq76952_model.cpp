@@ -63,6 +63,7 @@ Bq76952Inputs Bq76952Model::simple_circuit() {
   in.cell_v = cell_v;
   in.stack_v = in.pack_v = stack_v;
   in.ld_v = ld_v;
+  in.ts2_low = time_us >= ts2_low_from_us && time_us < ts2_low_until_us;
   in.shunt_v = current_a * shunt_mohm * 1e-3;
   for (std::size_t k = 0; k < simple_thermistors.size(); ++k) {
     if (temperature_c[k] != converted_c_[k]) {

@@ -35,6 +35,7 @@ class Bq76952Model {
   // A simple circuit for tests that have none of their own; advance(us) connects it. PACK is connected to the stack.
   std::array<double, 16> cell_v{};
   double stack_v = 0, ld_v = 0, current_a = 0, shunt_mohm = 0.1;
+  std::uint64_t ts2_low_from_us = 0, ts2_low_until_us = 0;
   std::array<double, 4> temperature_c{25, 25, 25, 25};  ///< of thermistors 103AT at TS1, TS3, HDQ, CFETOFF
 
   double charge_as = 0;  ///< true charge
@@ -45,7 +46,7 @@ class Bq76952Model {
   double cc3_loses = 0;                           ///< fraction of the current that CC3 does not contain
   std::uint16_t zero_cells = 0, stale_cells = 0;  ///< cells whose register reads 0, or keeps its value
   bool gone = false, hung = false, frozen = false, torn_buffer = false, only_cells = false, crc_from_otp = false,
-       deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false;
+       deep_sleep = false, sealed = false, needs_swap = false, ignores_writes = false, ignores_reset = false;
   std::uint16_t device_number = 0x7695;
   double bus_hz = 400e3;  ///< clock of the host
   struct Fault {
@@ -72,6 +73,8 @@ class Bq76952Model {
   /// bus work; when both have ended, SHUTDOWN follows. RESET ends it, which the FAQ says of the pin RST_SHUT only.
   bool in_soft_shutdown() const { return ending_; }
   double ld_high_v = 1.45;  ///< typical (E2E 1356033)
+  /// Between two calls of advance(), which sets it again.
+  void pull_ts2(bool low) { in_.ts2_low = low; }
   std::uint16_t balancing() const { return balancing_; }
   const bq::Protections& protections() const { return protections_; }
   const bq::Measurement& measurement() const { return measurement_; }

@@ -9,6 +9,7 @@
 #include "hal/requests.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/second_line.hpp"
+#include "hal/sleep.hpp"
 #include "tests/hal/bq76952_board.hpp"
 
 namespace bms {
@@ -141,6 +142,65 @@ TEST_F(Bq76952SecondLine, AfterASilenceTheOutputsAreOffBeforeTheChipEnablesThemA
     return;
   }
   FAIL() << "DDSG does not return";
+}
+
+/// The chip has received SHUTDOWN.
+class Bq76952SwitchOff : public Bq76952SecondLine {
+ protected:
+  /// Milliseconds until this core starts again, or a negative value.
+  double started_again_after_ms() {
+    const std::uint64_t begin_us = model.time_us;
+    feeds_us.clear();
+    try {
+      hal::switch_off();
+    } catch (const RunEnded&) {
+      return 1e-3 * static_cast<double>(model.time_us - begin_us);
+    }
+    return -1;
+  }
+  void low_for_ms(double ms) { model.ts2_low_until_us = model.time_us + static_cast<std::uint64_t>(1e3 * ms); }
+};
+
+TEST_F(Bq76952SwitchOff, ATS2ThatIsLowAtTheCommandResetsTheChip) {
+  low_for_ms(10'000);
+  model.advance(1'000);
+  const double ms = started_again_after_ms();
+  EXPECT_GT(ms, 200) << "the chip may take its time";
+  EXPECT_LT(ms, 800);
+  EXPECT_FALSE(model.in_soft_shutdown());
+  for (int k = 0; k < 20; ++k) sample = hal::next_sample();
+  EXPECT_EQ(sample->cell_uv[3], 3'300'000);
+  EXPECT_TRUE(model.ddsg() && model.dchg());
+  for (int k = 0; k < 20; ++k) {
+    hal::next_sample();
+    EXPECT_EQ(hal::second_line_trips(), 0U);
+  }
+}
+
+TEST_F(Bq76952SwitchOff, ATS2ThatGoesLowAfterTheCommandStartsItAgain) {
+  model.ts2_low_from_us = model.time_us + 100'000;
+  low_for_ms(10'000);
+  EXPECT_LT(started_again_after_ms(), 800);
+  EXPECT_FALSE(model.in_shutdown());
+}
+
+TEST_F(Bq76952SwitchOff, ASupplyThatDoesNotFallStartsThisCoreAgain) {
+  const double ms = started_again_after_ms();
+  EXPECT_TRUE(model.in_shutdown());
+  EXPECT_GT(ms, 1'000);
+  EXPECT_LT(ms, 1'600);
+}
+
+/// No public source says that RESET ends the wait in SHUTDOWN. Then it ends with TS2, and the supply with it.
+TEST_F(Bq76952SwitchOff, AChipThatCannotBeResetIsWaitedForWithTheWatchdogFed) {
+  model.ignores_reset = true;
+  low_for_ms(30'000);
+  model.advance(1'000);
+  const double ms = started_again_after_ms();
+  EXPECT_TRUE(model.in_shutdown());
+  EXPECT_NEAR(ms, 31'000, 1'000);
+  ASSERT_GT(feeds_us.size(), 100U);
+  for (std::size_t k = 1; k < feeds_us.size(); ++k) ASSERT_LT(feeds_us[k] - feeds_us[k - 1], 500'000U);
 }
 
 }  // namespace

@@ -147,6 +147,45 @@ TEST_F(Sleep, ANodeThatSendsInStepWithTheSamplesIsReceivedWithItsSecondFrame) {
   EXPECT_LT(latest_ms, period_ms + 200) << "before it would have sent by itself";
 }
 
+/// A falling edge of CAN RX after the n-th register write of the way into a stop, counted from the one that arms its
+/// line. No interrupt of these lines has a handler: taken by one, the edge would reset the chip.
+TEST_F(Sleep, AFrameInAnyMomentOfTheWayIntoTheStopIsKeptAndResetsNothing) {
+  constexpr std::uint32_t exti_pending = 0x40013C14, receive = 1U << 8, interrupts_enabled = 0xE000E100;
+  constexpr unsigned port_of_b = 1, most_writes = 60;
+  Cases cases(processors());
+  for (unsigned n = 0; n < most_writes; ++n) {
+    cases.start(fmt::format("after write {}", n), [&, n](Outcome& outcome) {
+      unsigned writes = 0;
+      bool armed = false, enables = false;
+      const auto chip_writes = world_.board.core().on_write;
+      world_.board.core().on_write = [&](std::uint32_t address, std::uint32_t value, unsigned bytes) {
+        chip_writes(address, value, bytes);
+        if (writes > n) return;
+        armed = armed || (address == exti_pending && value == receive);
+        if (!armed || writes++ != n) return;
+        enables = address == interrupts_enabled;
+        world_.exti.pin_edge(port_of_b, 8, false);
+      };
+      world_.run_until([&] { return writes > n; }, 300);
+      const unsigned stops = world_.board.stops;
+      world_.run_ms(3'000);
+      world_.board.core().on_write = chip_writes;
+      outcome.values["enables"] = enables;
+      if (writes <= n) outcome.fail("no such write");
+      if (!world_.board.resets.empty()) outcome.fail("a reset");
+      if (world_.board.stops > stops + 2) outcome.fail("the edge was not seen");
+    });
+  }
+  int with_the_interrupt = 0, all = 0;
+  for (const Outcome& o : cases.finish()) {
+    EXPECT_TRUE(o.good) << o.name << ": " << o.why;
+    with_the_interrupt += o.value("enables", 0) > 0 ? 1 : 0;
+    ++all;
+  }
+  EXPECT_EQ(all, most_writes);
+  EXPECT_GE(with_the_interrupt, 1) << "none of the writes enabled the interrupt";
+}
+
 /// Its ready flag stays, and its wake-up timer counts no more: a chip that stopped would be reset for ever.
 TEST_F(Sleep, ADeadCrystalOfTheClockLeavesItAwake) {
   world_.rtc.crystal = false;
@@ -210,6 +249,178 @@ TEST_F(SwitchOff, AnEmptyCellSwitchesTheBatteryOffUntilTheKeyIsTurned) {
   EXPECT_EQ(world_.vehicle.faults(), 0U) << "it is empty, and no fault";
   world_.vehicle.request = Request::charge;
   EXPECT_GE(world_.run_until([&] { return world_.closed(Relay::charge); }, start_limit_ms), 0) << "it can be charged";
+}
+
+/// Key, plug or a frame around the command that switches the battery off. What comes after the last reading of the
+/// inputs holds the front end on, with its outputs off, and the battery has to come back by itself.
+class SwitchOffWindow : public SwitchOff {
+ protected:
+  SwitchOffWindow() {
+    world_.hold_cell(7, 2.89);
+    world_.run_ms(50'000);
+    EXPECT_FALSE(world_.chip.in_shutdown());
+    world_.fine_steps(30'000, 0.5);
+    find_command();
+  }
+  struct Result {
+    int all = 0, before = 0, held_on = 0, after = 0;
+  };
+  /// The event `ms` after the command, which is not there yet if negative.
+  Result at_times(double from_ms, double to_ms, double step_ms, const std::function<void()>& event,
+                  const std::function<void(Outcome&)>& judge) {
+    Cases cases(processors());
+    for (double ms = from_ms; ms < to_ms; ms += step_ms) {
+      cases.start(fmt::format("{} ms after the command", ms), [&, ms](Outcome& outcome) {
+        world_.run_ms(command_ms_ + ms);
+        event();
+        follow(outcome, judge);
+      });
+    }
+    return count(cases);
+  }
+  /// The event after each of the last readings of the input pins before the command.
+  Result after_readings(unsigned last, const std::function<void()>& event, const std::function<void(Outcome&)>& judge) {
+    Cases cases(processors());
+    for (unsigned n = readings_ - last + 1; n <= readings_; ++n) {
+      cases.start(fmt::format("after reading {} of {}", n, readings_), [&, n](Outcome& outcome) {
+        unsigned readings = 0;
+        const auto chip_reads = world_.board.core().on_read;
+        world_.board.core().on_read = [&](std::uint32_t address, unsigned bytes) {
+          const std::uint32_t value = chip_reads(address, bytes);
+          if (address == input_pins && ++readings == n) event();
+          return value;
+        };
+        world_.run_until([&] { return readings >= n; }, 20'000);
+        world_.board.core().on_read = chip_reads;
+        follow(outcome, judge);
+      });
+    }
+    return count(cases);
+  }
+  void turn_key() {
+    world_.key_on = true;
+    world_.port_c.set_outside(2, true);
+    world_.chip.pull_ts2(true);
+  }
+  void put_in_plug() {
+    world_.plugged = true;
+    world_.port_c.set_outside(3, true);
+    world_.chip.pull_ts2(true);
+  }
+  void drive(Outcome& outcome) {
+    world_.hold_cell(7, 3.28);
+    world_.silence_bus(false);
+    if (const std::string why = bring_to(world_, pack_, Operating::standby); !why.empty()) outcome.fail(why);
+  }
+  void charge(Outcome& outcome) {
+    world_.silence_bus(false);
+    world_.vehicle.request = Request::charge;
+    if (world_.run_until([&] { return world_.closed(Relay::charge); }, start_limit_ms) < 0) outcome.fail("no charge");
+  }
+
+ private:
+  static constexpr std::uint32_t input_pins = 0x40020810;  // GPIOC_IDR; one reading of the inputs takes two
+  static constexpr std::uint64_t imbalance = 1U << 17;     ///< of the cell that is held
+
+  void find_command() {
+    Cases cases(1);
+    cases.start("without an event", [&](Outcome& outcome) {
+      unsigned readings = 0;
+      const auto chip_reads = world_.board.core().on_read;
+      world_.board.core().on_read = [&](std::uint32_t address, unsigned bytes) {
+        readings += address == input_pins && !world_.chip.in_shutdown() ? 1 : 0;
+        return chip_reads(address, bytes);
+      };
+      outcome.values["ms"] = world_.run_until([&] { return world_.chip.in_shutdown(); }, 20'000);
+      outcome.values["readings"] = readings;
+      world_.board.core().on_read = chip_reads;
+    });
+    const Outcome found = cases.finish().at(0);
+    command_ms_ = found.value("ms", -1);
+    readings_ = static_cast<unsigned>(found.value("readings", 0));
+    EXPECT_GT(command_ms_, 500);
+    EXPECT_GT(readings_, 20U);
+  }
+  void follow(Outcome& outcome, const std::function<void(Outcome&)>& judge) {
+    bool off = world_.chip.in_shutdown(), held_on = false;
+    world_.each_step = [&] {
+      off = off || world_.chip.in_shutdown();
+      held_on = held_on || world_.chip.in_soft_shutdown();
+    };
+    world_.run_ms(200);
+    outcome.values["off"] = off;
+    outcome.values["held on"] = held_on;
+    judge(outcome);
+    world_.each_step = nullptr;
+    if ((world_.vehicle.faults_seen() & ~imbalance) != 0) outcome.fail(fault_names(world_.vehicle.faults_seen()));
+    for (const std::string& violation : world_.violations()) outcome.fail(violation);
+  }
+  static Result count(Cases& cases) {
+    Result result;
+    for (const Outcome& o : cases.finish()) {
+      EXPECT_TRUE(o.good) << o.name << ": " << o.why;
+      if (o.value("held on", 0) > 0)
+        ++result.held_on;
+      else
+        ++(o.value("off", 0) > 0 ? result.after : result.before);
+      ++result.all;
+    }
+    fmt::print("{} moments: {} before it, {} held on, {} after it\n", result.all, result.before, result.held_on,
+               result.after);
+    return result;
+  }
+  double command_ms_ = -1;
+  unsigned readings_ = 0;  ///< of the input pins, until the command
+};
+
+TEST_F(SwitchOffWindow, AKeyAfterAnyReadingStartsTheTruck) {
+  const Result result = after_readings(
+      6, [&] { turn_key(); }, [&](Outcome& outcome) { drive(outcome); });
+  EXPECT_EQ(result.all, 6);
+  EXPECT_EQ(result.held_on, 2) << "all others are seen right before the command";
+  EXPECT_EQ(result.before, 4);
+}
+
+TEST_F(SwitchOffWindow, AKeyAtAnyTimeStartsTheTruck) {
+  const Result result = at_times(
+      -40, 20, 4, [&] { turn_key(); }, [&](Outcome& outcome) { drive(outcome); });
+  EXPECT_EQ(result.all, 15);
+  EXPECT_GT(result.before, 0);
+  EXPECT_GT(result.after, 0);
+}
+
+TEST_F(SwitchOffWindow, APlugAfterAnyReadingLetsTheBatteryBeCharged) {
+  const Result result = after_readings(
+      6, [&] { put_in_plug(); }, [&](Outcome& outcome) { charge(outcome); });
+  EXPECT_EQ(result.held_on, 2);
+  EXPECT_EQ(result.before, 4);
+}
+
+/// Nothing but key and plug hold the front end on, so a frame comes before the command or too late.
+TEST_F(SwitchOffWindow, AFrameKeepsItAwakeOrComesTooLate) {
+  NodeInStep node(world_);
+  const auto judge = [&](Outcome& outcome) {
+    world_.key_on = true;
+    drive(outcome);
+  };
+  const Result result = at_times(
+      -40, 20, 4, [&] { node.send_at(world_.now_ms() + 0.1); }, judge);
+  EXPECT_EQ(result.held_on, 0);
+  EXPECT_GT(result.before, 0);
+  EXPECT_GT(result.after, 0);
+}
+
+/// A battery that nobody uses is off, or goes off after its minute.
+TEST_F(SwitchOffWindow, AKeyThatIsTurnedForAMomentDoesNotKeepItOn) {
+  const auto judge = [&](Outcome& outcome) {
+    world_.key_on = false;
+    if (world_.run_until([&] { return world_.off(); }, 90'000) < 0) outcome.fail("on");
+    world_.key_on = true;
+    drive(outcome);
+  };
+  const Result result = after_readings(
+      2, [&] { turn_key(); }, judge);
+  EXPECT_EQ(result.held_on, 2);
 }
 
 /// The DC link of the last drive is at LD: with the command, the front end would wait with its outputs off.
