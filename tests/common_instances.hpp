@@ -19,7 +19,8 @@ using JsonOfText = nlohmann::detail::json_sax_dom_parser<Json>;
 using ChosenJsonOfText = nlohmann::detail::json_sax_dom_callback_parser<Json>;
 }  // namespace bms::common_instances
 
-// of nlohmann/json 3.11 and libstdc++ 12
+// Some are internal, so they are named for the versions of Debian 12 only; with others each source compiles its own.
+#if NLOHMANN_JSON_VERSION_MAJOR == 3 && NLOHMANN_JSON_VERSION_MINOR == 11 && _GLIBCXX_RELEASE == 12
 #define BMS_COMMON_INSTANCES(OF)                                                                       \
   OF class nlohmann::basic_json<>;                                                                     \
   OF class std::vector<bms::common_instances::Json>;                                                   \
@@ -36,5 +37,8 @@ using ChosenJsonOfText = nlohmann::detail::json_sax_dom_callback_parser<Json>;
   OF class std::__detail::_Compiler<bms::common_instances::Characters>;                                \
   OF class std::__detail::_Scanner<char>;                                                              \
   OF struct std::__detail::_NFA<bms::common_instances::Characters>;
+#else
+#define BMS_COMMON_INSTANCES(OF)
+#endif
 
 BMS_COMMON_INSTANCES(extern template)
