@@ -14,7 +14,8 @@
 #
 # A board that QEMU emulates (BMS_EMULATED ON) has all but the remote image. Another board has the first two, and the
 # hil image for an emulated board with the same chip (BMS_LOOP_BOARD). Next to each image lies its bill of materials,
-# bms_<board>*.cdx.json (sbom.py).
+# bms_<board>*.cdx.json (sbom.py), and for a board with a BQ76952 what this chip does by itself, as the image sets it,
+# bms_<board>*.second_line.md (second_line_table.py).
 #
 # board.cmake chooses the CAN back end and the source of the samples:
 #   BMS_CAN        slcan, or bxcan
@@ -376,6 +377,7 @@ function(bms_image name)
     COMMAND ${BMS_PYTHON} ${root}/cmake/image_check.py $<TARGET_FILE:${name}>
     COMMAND ${BMS_PYTHON} ${root}/cmake/sbom.py ${name} ${PROJECT_VERSION} ${CMAKE_CXX_COMPILER} ${cell_source}
       ${build}/${name}.map ${build}/${name}.elf
+    COMMAND ${BMS_PYTHON} ${root}/cmake/second_line_table.py ${build}/${name}.elf ${build}/${name}.second_line.md
     BYPRODUCTS ${build}/${name}.cdx.json VERBATIM)
   set_target_properties(${name} PROPERTIES
     LINK_DEPENDS "${linker_script};${core}/sections.ld" RUNTIME_OUTPUT_DIRECTORY ${build})

@@ -58,4 +58,5 @@ def main(path):
         f.write(elf.data)
 
 
-main(sys.argv[1])
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -3,6 +3,8 @@
 // simulated truck follows the contactor pins: they close in the right order and open in the time of protection's table.
 #include <cmath>
 #include <functional>
+#include <map>
+#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,6 +13,7 @@
 
 #include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "files/cell_file.hpp"
+#include "files/text_file.hpp"
 #include "images/firmware_image.hpp"
 #include "plant/link_poles.hpp"
 #include "tests/firmware/contactor_port_models.hpp"
@@ -456,6 +459,41 @@ TEST_F(Truck, DrivesWithWornOutFlashAndReportsIt) {
   board.flash.worn_out = true;
   EXPECT_TRUE(drive_off());
   EXPECT_EQ(faults().storage_fault, 1U);
+}
+
+/// Cells of the rows of a Markdown table, by the first one.
+std::map<std::string, std::vector<std::string>> rows_of(const std::string& page) {
+  std::map<std::string, std::vector<std::string>> rows;
+  std::istringstream lines(page);
+  for (std::string line; std::getline(lines, line);) {
+    std::vector<std::string> cells;
+    for (std::size_t at = 0; line.starts_with("| ") && at + 2 < line.size();) {
+      const std::size_t end = line.find(" |", at + 2);
+      cells.push_back(line.substr(at + 2, end - at - 2));
+      at = end + 1;
+    }
+    if (cells.size() > 3) rows[cells[0]] = cells;
+  }
+  return rows;
+}
+
+/// The table next to the image is read from the bytes of the image, by the manual of the chip. The one of the README is
+/// computed by the code of the firmware.
+TEST(SecondLineTable, OfTheImageIsTheColumnOfTheReadme) {
+  std::filesystem::path table = image();
+  const auto of_image = rows_of(files::read_file(table.replace_extension(".second_line.md")));
+  const auto of_readme = rows_of(files::read_file(BMS_SOURCE_DIR "/hal/bq76952/README.md"));
+  int compared = 0;
+  for (const char* name : {"COV", "CUV", "OCC", "OCD1", "OCD2", "OCD3", "SCD", "OTC", "OTD", "UTC"}) {
+    ASSERT_TRUE(of_image.contains(name) && of_readme.contains(name)) << name;
+    const auto &here = of_image.at(name), &there = of_readme.at(name);
+    EXPECT_EQ(here[1], there[1]) << name << ": what it opens";
+    EXPECT_EQ(here[2], there[2]) << name << ": threshold";
+    EXPECT_NEAR(std::stod(here.back()), std::stod(there.back()), 0.051) << name << ": delay";
+    ++compared;
+  }
+  EXPECT_EQ(compared, 10);
+  EXPECT_TRUE(of_image.contains("host watchdog"));
 }
 
 }  // namespace
