@@ -24,8 +24,6 @@ const protection::ProtectionPlan& BoardCell::plan() {
                 "BMS_PRECHARGE_S, BMS_CLOSING_A or BMS_CLOSING_OHM is out of range");
   static_assert(protection::current_sensor_suffices(board_pack),
                 "the current sensor of the board (BMS_CURRENT_RANGE_A) ends below a short circuit of this cell");
-  static_assert(protection::pulses_end_below_short_circuit(board_pack),
-                "a pulse rating of the cell is above the current that counts as a short circuit on this board");
   static constexpr auto plan = protection::protection_plan(board_pack);
   static_assert(protection::consistent(plan.rules), "limits of the cell contradict each other");
   return active_plan_or<BoardCell>(plan);

@@ -11,8 +11,7 @@
 //                         continuous current
 //   discharge overcurrent 1.2 and 1.5 times short circuit, or the     0.42 s, 0.35 s
 //                         end of the comparator
-//   sustained overcurrent 2 times the continuous current, or 1.25     20 s, discharge
-//                         times the largest pulse that is rated
+//   sustained overcurrent 2 times the continuous current              20 s, discharge
 //   hot                   5 K above charge overtemperature and        20 s
 //                         above overtemperature
 //   cold                  5 K below charge undertemperature           20 s, charge
@@ -37,7 +36,6 @@ namespace bms::firmware {
 inline constexpr double voltage_margin_v = 0.02, slower_by_s = 0.8;
 inline constexpr double overcurrent_ratio = 1.2, high_overcurrent_ratio = 1.5, short_circuit_ratio = 2;
 inline constexpr double sustained_ratio = 2, sustained_delay_s = 20;  ///< of the continuous discharge current
-inline constexpr double pulse_margin = 1.25;                          ///< over the largest rated pulse of discharging
 inline constexpr double least_charge_ratio = 3;                       ///< of the continuous charge current
 inline constexpr int temperature_margin_c = 5;
 inline constexpr std::uint8_t temperature_delay_s = 20;
@@ -72,8 +70,7 @@ constexpr hal::bq76952::Board front_end_board(const protection::PackDesign& pack
           .high_overcurrent_a = high_overcurrent_ratio * short_a,
           .high_overcurrent_delay_s = high_overcurrent_delay_s,
           .short_circuit_a = std::max(short_circuit_ratio * short_a, pack.closing_current_max_a),
-          .sustained_a = std::max(sustained_ratio * pack.limits.discharge_current_max_a,
-                                  pulse_margin * pack.pulses.discharge.most_a()),
+          .sustained_a = sustained_ratio * pack.limits.discharge_current_max_a,
           .sustained_delay_s = sustained_delay_s,
           .charge_hot_c = celsius(charge_overtemperature) + temperature_margin_c,
           .discharge_hot_c = celsius(overtemperature) + temperature_margin_c,
@@ -148,22 +145,16 @@ constexpr bool overcurrent_is_wider_and_slower(const SecondLine& chip, const pro
   };
   return (slower(chip.charge_overcurrent_a, chip.charge_overcurrent_s) ||
           (chip.charge_overcurrent_a >= least_charge_ratio * pack.limits.charge_current_max_a &&
-           chip.charge_overcurrent_a >= pulse_margin * pack.pulses.charge.most_a() &&
            chip.charge_overcurrent_s >= first_line_s(1, pack.sample_period_s))) &&
          slower(chip.overcurrent_a, chip.overcurrent_s) && slower(chip.high_overcurrent_a, chip.high_overcurrent_s) &&
          chip.short_circuit_a > row_a;
 }
 /// The overload integral of the first line forbids, and opens after its grace time of five seconds. A calibration may
-/// lower a reading. Of rated pulses: above 1.05 of the largest one, the integral is full after half a second.
+/// lower a reading.
 constexpr bool sustained_is_wider_and_slower(const SecondLine& chip, const protection::Rules& rules,
                                              const protection::PackDesign& pack) {
   constexpr double counts_from = 1.05, least_reading = 0.95, grace_s = 5, chain_s = 0.5;
   const double times = least_reading * chip.sustained_a / (counts_from * pack.limits.discharge_current_max_a);
-  if (pack.pulses.discharge.stated()) {
-    constexpr double unrated_s = 0.5;
-    return least_reading * chip.sustained_a > counts_from * pack.pulses.discharge.most_a() &&
-           chip.sustained_s >= unrated_s + grace_s + chain_s;
-  }
   const double heat_s = 1e-6 * rule_of(rules, protection::Fault::discharge_overcurrent).threshold;
   return times > 1 && chip.sustained_s >= heat_s / (times * times - 1) + grace_s + chain_s;
 }

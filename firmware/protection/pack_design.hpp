@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "model/cell_parameters.hpp"
-#include "model/pulse_ratings.hpp"
 
 namespace bms::protection {
 
@@ -46,7 +45,6 @@ struct PackDesign {
   /// Second current sensor: range, offset with its converter, and error of the gains of both sensors together (Hall
   /// sensor 2 %, front end and shunt without calibration 6 %).
   double second_current_range_a = 1'000, second_current_offset_a = 20, current_gain_error = 0.1;
-  model::PulseRatings pulses = {};  ///< of one cell, if its file states any
 };
 
 /// Rounded to 1e-6, saturated at +-2,147.48.
@@ -79,12 +77,5 @@ constexpr double short_circuit_a(const PackDesign& d) {
 /// built. Up to 1,290 A overloads of 1.5 times the continuous limit are carried for their time; of larger packs, those
 /// above the range count as a short circuit.
 constexpr bool current_sensor_suffices(const PackDesign& d) { return short_circuit_a(d) <= 0.99 * measurable_a(d); }
-
-/// Returns true if a pulse at its rating stays below the current of a short circuit, with the error of the sensor.
-/// Firmware for a design whose sensor ends below its pulses is not built.
-constexpr bool pulses_end_below_short_circuit(const PackDesign& d) {
-  constexpr double sensor_error = 1.06;
-  return sensor_error * std::max(d.pulses.charge.most_a(), d.pulses.discharge.most_a()) <= short_circuit_a(d);
-}
 
 }  // namespace bms::protection

@@ -2,8 +2,7 @@
 // as missing.
 //
 //   overload I2t      h += ((I / limit)^2 - 1) dt, not below 0, with limit = 1.05 x continuous limit: a thermal replica
-//                     after IEC 60255-149, without its exponential. At rest 30 s of overload decay in 30 s. Of a cell
-//                     whose file rates pulses: the share of these ratings (pulse_rating.hpp)
+//                     after IEC 60255-149, without its exponential. At rest 30 s of overload decay in 30 s.
 //   opposite shift    a broken sense wire floats between its neighbours: one cell reads low, the next equally high.
 //                     Counts if the two shifts differ by less than half of the smaller.
 //   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV:
@@ -24,7 +23,6 @@
 #include "measurement/pack_sample.hpp"
 #include "protection/fault_monitor.hpp"
 #include "protection/pack_design.hpp"
-#include "protection/pulse_rating.hpp"
 
 namespace bms::protection {
 
@@ -34,18 +32,14 @@ struct PackLimits {
   std::int32_t common_range_ua;                      ///< that both current sensors can measure, at most 1,000 A
   std::int32_t gain_error_256ths;                    ///< of both current sensors together
   std::uint8_t temperatures;
-  PulsePlan charge_pulses, discharge_pulses;
 };
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
-  return {part(d.limits.charge_current_max_a),
-          part(d.limits.discharge_current_max_a),
+  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
           in_micro(std::min({d.current_range_a, d.second_current_range_a, 1'000.0})),
           static_cast<std::int32_t>(256 * d.current_gain_error + 0.5),
-          std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures),
-          pulse_plan(d.pulses.charge, d.limits.charge_current_max_a),
-          pulse_plan(d.pulses.discharge, d.limits.discharge_current_max_a)};
+          std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
 }
 
 /// Magnitude of the difference of two current readings, less the part that the error of their gains explains [uA]. May
@@ -165,10 +159,8 @@ class PackQuantities {
     at(q, Quantity::currents_missing) = known ? 0 : 1;
     at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : measurement::no_reading;
     if (known) {
-      integrate_overload(charge_overload_i2t_us_, charge_pulses_, limits_.charge_pulses,
-                         current_ua / limits_.charge_ua_256th, step_us);
-      integrate_overload(discharge_overload_i2t_us_, discharge_pulses_, limits_.discharge_pulses,
-                         -current_ua / limits_.discharge_ua_256th, step_us);
+      integrate_overload(charge_overload_i2t_us_, current_ua / limits_.charge_ua_256th, step_us);
+      integrate_overload(discharge_overload_i2t_us_, -current_ua / limits_.discharge_ua_256th, step_us);
     }
     at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_i2t_us_ : measurement::no_reading;
     at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_i2t_us_ : measurement::no_reading;
@@ -176,13 +168,9 @@ class PackQuantities {
 
   /// times_256: current / limit in 1/256, negative in the other direction. Above ten it counts as ten, which is a short
   /// circuit anyway. A reading at the end of the sensor's range counts as this current.
-  static constexpr void integrate_overload(std::int32_t& overload_i2t_us, PulseIntegral& pulses, const PulsePlan& plan,
-                                           std::int32_t times_256, std::uint32_t step_us) {
-    const std::int32_t clamped = std::clamp(times_256, std::int32_t{0}, pulse_detail::unlimited_256);
-    if (plan.top_256 != 0) {
-      overload_i2t_us = pulses.update(plan, clamped, step_us);
-      return;
-    }
+  static constexpr void integrate_overload(std::int32_t& overload_i2t_us, std::int32_t times_256,
+                                           std::uint32_t step_us) {
+    const std::int32_t clamped = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
     const std::int64_t more_us =
         (static_cast<std::int64_t>(clamped * clamped - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
     overload_i2t_us =
@@ -219,7 +207,6 @@ class PackQuantities {
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
   std::array<std::array<Repeats, 2>, measurement::max_temperatures> temperature_{};  ///< against the two middle ones
-  PulseIntegral charge_pulses_, discharge_pulses_;
   std::int32_t charge_overload_i2t_us_ = 0, discharge_overload_i2t_us_ = 0, sum_uv_ = measurement::no_reading;
 };
 

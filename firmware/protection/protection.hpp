@@ -253,16 +253,8 @@ class Protection {
     const auto exceeds = [rest_ua](std::int32_t ua, std::int32_t allowed_ua) {
       return ua > 0 && ua - allowed_ua > allowed_ua / 10 + rest_ua;
     };
-    const auto with_pulses = [](std::int32_t allowed_ua, std::int32_t most_ua, const PulsePlan& pulses) {
-      if (allowed_ua < most_ua || pulses.top_256 == 0) return allowed_ua;
-      return static_cast<std::int32_t>(std::int64_t{most_ua} * pulses.top_256 / 256);
-    };
-    const AllowedCurrent& allowed = decision_.allowed;
     at(q, Quantity::exceeds_allowed) =
-        exceeds(current_ua,
-                with_pulses(allowed.charge_ua, plan_->derating.charge_max_ua, plan_->limits.charge_pulses)) ||
-        exceeds(-current_ua,
-                with_pulses(allowed.discharge_ua, plan_->derating.discharge_max_ua, plan_->limits.discharge_pulses));
+        exceeds(current_ua, decision_.allowed.charge_ua) || exceeds(-current_ua, decision_.allowed.discharge_ua);
     at(q, Quantity::flows_unrequested) =
         contactors_.state() == ContactorState::unloading && magnitude(current_ua) > rest_ua;
   }

@@ -56,18 +56,12 @@ std::string names(const std::vector<model::MechanismSetting>& mechanisms) {
   return text.empty() ? "none" : text;
 }
 
-/// Limits, capacity and pulse ratings: what the firmware protects by.
+/// Limits and capacity: what the firmware protects by.
 class ProtectedBy {
  public:
   std::vector<std::pair<std::string, double>> values;
 
-  explicit ProtectedBy(const files::CellFile& file) {
-    model::visit_cell(*this, file.parameters);
-    for (const auto& [name, rating] : {std::pair("charge", file.pulses.charge), {"discharge", file.pulses.discharge}}) {
-      values.emplace_back(fmt::format("pulses.{}_10s_a", name), rating.for_10s_a);
-      values.emplace_back(fmt::format("pulses.{}_30s_a", name), rating.for_30s_a);
-    }
-  }
+  explicit ProtectedBy(const model::CellParameters<>& p) { model::visit_cell(*this, p); }
 
   void table(const char* key) { table_ = key; }
   bool optional_table(const char* key, bool known) {
@@ -96,7 +90,7 @@ void refuse_other_model(const files::CellFile& cell, const files::CellFile& buil
                               ", expected a cell file that differs from it in its tables only; this one needs new "
                               "firmware (bms image sign)");
   };
-  const ProtectedBy now(cell), before(built);
+  const ProtectedBy now(cell.parameters), before(built.parameters);
   for (std::size_t k = 0; k < now.values.size(); ++k) {
     if (now.values[k].second != before.values[k].second)
       refuse(fmt::format("{} is {}, of the firmware's cell file {}, and the firmware protects by it",

@@ -72,14 +72,6 @@ std::vector<std::string> scale_to(double capacity_ah, files::CellFile& cell) {
   for (double* a : {&p.limits.charge_current_max_a, &p.limits.discharge_current_max_a}) {
     *a = std::clamp(*a * times, model::accepted::current_a.low, model::accepted::current_a.high);
   }
-  for (model::PulseRating* rating : {&cell.pulses.charge, &cell.pulses.discharge}) {
-    rating->for_10s_a *= times;
-    rating->for_30s_a *= times;
-  }
-  if (model::first_fault(cell.pulses, p.limits).what != nullptr) {
-    cell.pulses = {};
-    clamped.emplace_back("pulses");
-  }
   for (double* a :
        {&p.noise.current_a, &p.noise.current_offset_a, &p.noise.current_unknown_a, &p.noise.current_at_rest_a}) {
     *a *= times;

@@ -256,7 +256,6 @@ struct Rounding {
 void round_digits(files::CellFile& cell) {
   Rounding rounding;
   model::visit_cell(rounding, cell.parameters);
-  model::visit_pulses(rounding, cell.pulses);
   for (files::TemperatureTable& at : cell.at_temperature) model::visit_rc(rounding, at.rc);
   for (model::MechanismSetting& m : cell.mechanisms) {
     for (double& v : m.value) Rounding::number("", v);

@@ -289,18 +289,5 @@ TEST(SecondLineOfTheFrontEnd, APackOfFewerCellsHasItsInputs) {
   EXPECT_EQ(table9.at(0x9304), 0xFFFFU);
 }
 
-/// A pulse of 30 s of more than twice the continuous current must not trip the chip before the first line.
-TEST(SecondLineOfTheFrontEnd, LeavesRatedPulsesToTheFirstLine) {
-  const Chip without(tests::table9.limits, 6);
-  Chip chip = without;
-  chip.pack.pulses.discharge = {24, 18};
-  EXPECT_FALSE(sustained_is_wider_and_slower(chip.line, chip.rules, chip.pack)) << "12 A for 20 s, below the pulses";
-  chip.board = front_end_board(chip.pack, chip.rules);
-  chip.settings = hal::bq76952::settings(chip.board);
-  chip.line = second_line(chip.settings, chip.board.shunt_mohm);
-  EXPECT_NEAR(chip.line.sustained_a, 30, 0.11);
-  EXPECT_TRUE(chip.wider_and_slower());
-}
-
 }  // namespace
 }  // namespace bms::firmware

@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <random>
-
 #include <algorithm>
 #include <fstream>
 #include <functional>
@@ -162,56 +160,6 @@ TEST(CellFile, KnowsWhereItWasIdentifiedIfItStatesIt) {
   EXPECT_EQ(again.parameters.tolerance.resistance_per_ev, 0.07);
   cell.parameters.range.temperature_max_c = -10;
   EXPECT_THROW(parse_cell(cell_text(cell), "wrong"), BadInput) << "the maximum is below the minimum";
-}
-
-TEST(CellFile, ReadsWritesAndChecksPulseRatings) {
-  CellFile cell = read_cell("table9");
-  EXPECT_FALSE(cell.pulses.stated());
-  EXPECT_EQ(cell_text(cell).find("[pulses]"), std::string::npos);
-  cell.sources["pulses"] = "data sheet, 6.2";
-  cell.pulses.charge.for_10s_a = 12;
-  cell.pulses.discharge = {18.5, 13};
-  const std::string text = cell_text(cell);
-  const CellFile again = parse_cell(text, "again");
-  EXPECT_EQ(again.pulses.charge.for_10s_a, 12);
-  EXPECT_EQ(again.pulses.charge.for_30s_a, 0);
-  EXPECT_EQ(again.pulses.discharge.for_10s_a, 18.5);
-  EXPECT_EQ(again.pulses.discharge.for_30s_a, 13);
-  EXPECT_EQ(again.sources.at("pulses"), "data sheet, 6.2");
-  EXPECT_EQ(cell_text(again), text);
-  EXPECT_THAT(cell_refusal(replaced(text, "discharge_10s_a = 18.5", "discharge_10s_a = 28.0")),
-              HasSubstr("'pulses.discharge_10s_a' is out of range, expected 1.2 to 4.5 times the continuous current"));
-  EXPECT_THAT(cell_refusal(replaced(text, "charge_10s_a = 12.0", "charge_10s_a = 6.5")),
-              HasSubstr("'pulses.charge_10s_a' is out of range"));
-  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a = 13.0", "discharge_30s_a = nan")),
-              HasSubstr("'pulses.discharge_30s_a'"));
-  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a = 13.0", "discharge_30s_a = 17.0")),
-              HasSubstr("at least 1.15 times the rating for 30 s"));
-  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a", "discharge_60s_a")), HasSubstr("discharge_60s_a"));
-}
-
-/// Random ratings: a file that is accepted has ratings in their ranges, and is the same when it is written and read.
-TEST(CellFile, AcceptsNoPulseRatingOutOfItsRange) {
-  std::mt19937 random(29);
-  std::uniform_real_distribution<double> ratio(0.9, 5);
-  int accepted = 0;
-  for (int k = 0; k < 300; ++k) {
-    CellFile cell = read_cell("table9");
-    const double limit_a = cell.parameters.limits.discharge_current_max_a, for_10s = ratio(random),
-                 for_30s = k % 3 == 0 ? 0 : ratio(random);
-    cell.pulses.discharge = {for_10s * limit_a, for_30s * limit_a};
-    const bool good = for_10s > 1.2 && for_10s < 4.5 &&
-                      (for_30s == 0 || (for_30s > 1.2 && for_30s < 4.5 && for_10s > 1.15 * for_30s));
-    const std::string text = cell_text(cell);
-    try {
-      EXPECT_EQ(parse_cell(text, "again").pulses.discharge.for_10s_a, cell.pulses.discharge.for_10s_a);
-      EXPECT_TRUE(good) << for_10s << " and " << for_30s;
-      ++accepted;
-    } catch (const BadInput&) {
-      EXPECT_FALSE(good) << for_10s << " and " << for_30s;
-    }
-  }
-  EXPECT_GT(accepted, 60);
 }
 
 TEST(CellFile, RejectsABinaryFile) {
