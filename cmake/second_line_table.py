@@ -85,7 +85,7 @@ def table(images):
 
 
 def main(arguments):
-    if all("=" in a for a in arguments):
+    if not (len(arguments) == 2 and arguments[1].endswith(".md")):
         sys.stdout.write(table({name: Image(path) for name, path in (a.split("=", 1) for a in arguments)}))
         return
     elf, out = arguments

@@ -128,13 +128,19 @@ class OtherCells {
   std::vector<Middle> middle_;
 };
 
-/// Squared difference of changes: those of the readings against `others` `lag` rows before, with the best factor.
-double error_at_lag(const std::vector<double>& v, const std::vector<double>& others_v, std::ptrdiff_t lag) {
+std::vector<double> changes_of(const std::vector<double>& v) {
+  std::vector<double> changes(v.size(), no_value);
+  for (std::size_t k = 1; k < v.size(); ++k) changes[k] = v[k] - v[k - 1];
+  return changes;
+}
+
+/// Squared difference of changes, over their square: of the first ones against the others `lag` rows before, with the
+/// best factor.
+double error_at_lag(const std::vector<double>& changes_v, const std::vector<double>& others_v, std::ptrdiff_t lag) {
   double vv = 0, vm = 0, mm = 0;
-  const auto rows = static_cast<std::ptrdiff_t>(v.size());
+  const auto rows = static_cast<std::ptrdiff_t>(changes_v.size());
   for (std::ptrdiff_t k = std::max<std::ptrdiff_t>(1, 1 + lag); k < std::min(rows, rows + lag); ++k) {
-    const auto at = static_cast<std::size_t>(k), from = static_cast<std::size_t>(k - lag);
-    const double dv = v[at] - v[at - 1], dm = others_v[from];
+    const double dv = changes_v[static_cast<std::size_t>(k)], dm = others_v[static_cast<std::size_t>(k - lag)];
     if (!std::isfinite(dv + dm)) continue;
     vv += dv * dv;
     vm += dv * dm;
@@ -143,17 +149,27 @@ double error_at_lag(const std::vector<double>& v, const std::vector<double>& oth
   return mm > 0 && vv > 0 ? 1 - vm * std::max(vm, 0.0) / (vv * mm) : 1;
 }
 
+/// Returns true if the changes are alike `lag` rows later, within a row.
+bool repeats(const std::vector<double>& changes_v, std::ptrdiff_t lag) {
+  for (std::ptrdiff_t near = lag - 1; near <= lag + 1; ++near) {
+    if (std::abs(near) > 1 && error_at_lag(changes_v, changes_v, near) < 1 - of_channels.lag_gain) return true;
+  }
+  return false;
+}
+
 /// Lag of the readings behind those of the other cells, whose changes are others_v, in whole rows. Not behind the
-/// current: what it did within a row is unknown, and a load with a period of its own is alike at several lags.
+/// current: what it did within a row is unknown. Not by a time after which the load is alike: a channel that is read
+/// some tenths of a row later than the others is then as well a period and those tenths late.
 double best_lag(const std::vector<double>& v, const std::vector<double>& others_v, double step_s) {
   const auto rows_of = [&](double s) { return static_cast<std::ptrdiff_t>(s / step_s); };
-  const double now = error_at_lag(v, others_v, 0);
+  const std::vector<double> changes_v = changes_of(v);
+  const double now = error_at_lag(changes_v, others_v, 0);
   double best = now;
   std::ptrdiff_t found = 0;
   const double last_s = std::max(of_channels.lag_to_s, of_channels.lag_rows * step_s);
   for (std::ptrdiff_t lag = rows_of(of_channels.lag_from_s); lag <= rows_of(last_s); ++lag) {
-    const double error = error_at_lag(v, others_v, lag);
-    if (error >= best) continue;
+    const double error = error_at_lag(changes_v, others_v, lag);
+    if (error >= best || repeats(others_v, lag)) continue;
     best = error;
     found = lag;
   }

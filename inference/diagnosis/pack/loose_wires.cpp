@@ -135,6 +135,11 @@ class Readings {
     return std::abs(between(from, to)) > leap_v_ + unknown_v_[to];
   }
   bool is_same(std::size_t from, std::size_t to) const { return std::abs(between(from, to)) <= leap_v_; }
+  /// `to` says as much of the level as `from`, of which the cells' drift makes less with each row.
+  bool replaces(std::size_t from, std::size_t to) const {
+    const double drift_v = leap_v_ * static_cast<double>(to - from) / static_cast<double>(of_wires.rows_of_one_leap);
+    return is_same(from, to) && unknown_v_[to] <= std::max(leap_v_, unknown_v_[from]) + drift_v;
+  }
   /// Two rows that lie nearer together than either is to another one.
   bool are_together(std::size_t a, std::size_t b, std::size_t other) const {
     return std::abs(between(a, b)) < of_wires.same_level * std::abs(between(other, a)) + leap_v_ / 2;
@@ -164,11 +169,12 @@ Levels levels_of(const Pair& p, double quiet_a) {
     const bool stays = k + 1 < p.row.size() && readings.are_together(k, k + 1, last);
     const bool leaps = readings.is_leap(last, k) && stays;
     const double leap_v = readings.between(last, k), along_v = sum_v[k] - sum_v[last];
-    if (!leaps && !readings.is_same(last, k)) {
-      if (!stays) odd_v.push_back(std::abs(leap_v));
+    if (!leaps) {
+      if (!stays && !readings.is_same(last, k)) odd_v.push_back(std::abs(leap_v));
+      if (readings.replaces(last, k)) last = k;
       continue;
     }
-    if (leaps && std::abs(along_v) < of_wires.single_cell * std::abs(leap_v)) {
+    if (std::abs(along_v) < of_wires.single_cell * std::abs(leap_v)) {
       sum.add(leap_v, along_v);
       before.add(leap_v, before_v[k] - before_v[last]);
       after.add(leap_v, after_v[k] - after_v[last]);
