@@ -145,10 +145,8 @@ TEST(SingleReadings, ALoadWithAPeriodOfSomeRowsMakesNoChannelLate) {
     EXPECT_NE(f.cause, dp::Cause::late) << *f.cell << ": " << f.value << " +- " << f.sigma;
 }
 
-/// In a pack of three the usual lag is that of the cell in the middle: if two seem late by a period, the third one is
-/// not early once they are not.
+/// In a pack of three the usual lag is that of the cell in the middle: two that seem late by a period make it early.
 TEST(SingleReadings, InAPackOfThreeALoadWithAPeriodMakesNoChannelLateOrEarly) {
-  std::size_t moved = 0;
   for (const double period_s : {8.3, 9.9, 14.3, 17.9, 26.3}) {
     for (const double span_s : {0.3, 0.6, 0.9}) {
       dp::PackRecording pack = simulate({.rows_s = 1, .hours = 2, .span_s = span_s}, [&](double time_s) {
