@@ -469,6 +469,7 @@ std::map<std::string, std::vector<std::string>> rows_of(const std::string& page)
     std::vector<std::string> cells;
     for (std::size_t at = 0; line.starts_with("| ") && at + 2 < line.size();) {
       const std::size_t end = line.find(" |", at + 2);
+      if (end == std::string::npos) break;
       cells.push_back(line.substr(at + 2, end - at - 2));
       at = end + 1;
     }
