@@ -210,7 +210,7 @@ double usual_level(const Levels& levels) {
 }
 
 PackFinding finding_of(const PackRecording& pack, const Pair& p, std::size_t c, const std::vector<char>& bad,
-                       std::vector<double> leaps_v) {
+                       std::size_t rows, std::vector<double> leaps_v) {
   PackFinding f;
   f.cause = Cause::sense_wire;
   f.cell = c;
@@ -225,9 +225,8 @@ PackFinding finding_of(const PackRecording& pack, const Pair& p, std::size_t c, 
     times += fmt::format("{}{:.0f} to {:.0f} s", k == 0 ? "" : ", ", pack.time_s[p.row[stretches[k].begin]] - start_s,
                          pack.time_s[p.row[stretches[k].end - 1]] - start_s);
   if (stretches.size() > of_wires.named) times += fmt::format(" and {} more times", stretches.size() - of_wires.named);
-  f.because = fmt::format(
-      "Its contact is intermittent: bad in {:.1f} % of the rows, from {}. The rows are left out.",
-      100 * static_cast<double>(std::count(bad.begin(), bad.end(), 1)) / static_cast<double>(pack.rows()), times);
+  f.because = fmt::format("Its contact is intermittent: bad in {:.1f} % of the rows, from {}. The rows are left out.",
+                          100 * static_cast<double>(rows) / static_cast<double>(pack.rows()), times);
   return f;
 }
 
@@ -245,7 +244,7 @@ std::vector<LooseWire> take_loose_wires(PackRecording& pack, double quiet_a) {
     for (const double v : levels.of_row_v) bad.push_back(std::abs(v - usual_v) > levels.leap_v / 2 ? 1 : 0);
     const auto rows = static_cast<std::size_t>(std::count(bad.begin(), bad.end(), 1));
     if (rows < (levels.leaps_v.size() == 1 ? of_wires.rows_of_one_leap : of_wires.rows)) continue;
-    wires.push_back({c, rows, finding_of(pack, p, c, bad, levels.leaps_v)});
+    wires.push_back({c, rows, finding_of(pack, p, c, bad, rows, levels.leaps_v)});
     for (std::size_t k = 0; k < bad.size(); ++k) {
       if (bad[k] != 0) pack.cell_v[c][p.row[k]] = pack.cell_v[c + 1][p.row[k]] = no_value;
     }

@@ -30,7 +30,7 @@ inline const update::SigningKey& key_of(const std::string& name) {
 }
 
 /// Sectors 0 and 1 of the model are the slots, sector 2 the one-time words.
-class ModelSlots final : public SlotFlash {
+class ModelSlots : public SlotFlash {
  public:
   explicit ModelSlots(FlashModel& model) : model_(&model) {}
   std::uint32_t slot_bytes() const override { return model_->size().sector_bytes; }

@@ -46,31 +46,19 @@ TEST_F(SlotsTest, ThreeLossesOfPowerEndATrial) {
   EXPECT_EQ(bench_.reset(true).slot, 0);
 }
 
-/// Words that cannot be programmed any more.
-class WornTrialMarks final : public SlotFlash {
+/// The words of the trials cannot be programmed any more.
+class WornTrialMarks final : public ModelSlots {
  public:
-  explicit WornTrialMarks(SlotFlash& slots) : slots_(&slots) {}
-  std::uint32_t slot_bytes() const override { return slots_->slot_bytes(); }
-  bool erase(std::uint8_t slot) override { return slots_->erase(slot); }
+  using ModelSlots::ModelSlots;
   bool program(std::uint8_t slot, std::uint32_t at, std::uint32_t word) override {
     const std::uint32_t from_end = slot_bytes() - at;
-    return (from_end < 48 && from_end >= 36) ? false : slots_->program(slot, at, word);
+    return (from_end < 48 && from_end >= 36) ? false : ModelSlots::program(slot, at, word);
   }
-  void read(std::uint8_t slot, std::uint32_t at, std::span<std::uint8_t> into) override {
-    slots_->read(slot, at, into);
-  }
-  std::uint32_t one_time(std::uint32_t word) override { return slots_->one_time(word); }
-  bool program_one_time(std::uint32_t word, std::uint32_t value) override {
-    return slots_->program_one_time(word, value);
-  }
-
- private:
-  SlotFlash* slots_;
 };
 
 TEST_F(SlotsTest, ATrialThatCannotBeCountedDoesNotBegin) {
   install();
-  WornTrialMarks worn(bench_.slots());
+  WornTrialMarks worn(bench_.flash());
   const Start start = choose(worn, bench_.battery(), true);
   EXPECT_TRUE(start.found && !start.trial);
   EXPECT_EQ(start.slot, 0);
