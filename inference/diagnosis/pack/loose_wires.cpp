@@ -132,13 +132,12 @@ class Readings {
   double between(std::size_t from, std::size_t to) const { return half_v_[to] - half_v_[from]; }
   /// From a row that is known to have the level.
   bool is_leap(std::size_t from, std::size_t to) const {
-    return std::abs(between(from, to)) > leap_v_ + unknown_v_[to];
+    return std::abs(between(from, to)) > leap_v_ + unknown_v_[to] + drift(from, to);
   }
   bool is_same(std::size_t from, std::size_t to) const { return std::abs(between(from, to)) <= leap_v_; }
   /// `to` says as much of the level as `from`, of which the cells' drift makes less with each row.
   bool replaces(std::size_t from, std::size_t to) const {
-    const double drift_v = leap_v_ * static_cast<double>(to - from) / static_cast<double>(of_wires.rows_of_one_leap);
-    return is_same(from, to) && unknown_v_[to] <= std::max(leap_v_, unknown_v_[from]) + drift_v;
+    return is_same(from, to) && unknown_v_[to] <= std::max(leap_v_, unknown_v_[from]) + drift(from, to);
   }
   /// Two rows that lie nearer together than either is to another one.
   bool are_together(std::size_t a, std::size_t b, std::size_t other) const {
@@ -146,6 +145,11 @@ class Readings {
   }
 
  private:
+  /// What the cells may drift apart from row to row.
+  double drift(std::size_t from, std::size_t to) const {
+    return leap_v_ * static_cast<double>(to - from) / static_cast<double>(of_wires.rows_of_one_leap);
+  }
+
   std::vector<double> half_v_, unknown_v_;
   double leap_v_ = 0;
 };

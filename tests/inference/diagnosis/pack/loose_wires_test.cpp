@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <functional>
 #include <random>
@@ -157,6 +158,21 @@ TEST(LooseWires, AreNotStepsOfTheLoadBetweenTheChannelsOfARow) {
                  : 0;
   }
   EXPECT_GE(found, 38U) << "a wire among such rows";
+}
+
+/// A cell near its end drifts away while the load changes in every row, so that no row shows the level.
+TEST(LooseWires, AreNotADriftWhileTheLoadHidesIt) {
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    dp::PackRecording pack = pack_of(4, seed, [](std::size_t k, std::vector<double>& v) {
+      constexpr std::size_t from = 800, until = 950;
+      const bool hides = k >= from && k < until;
+      for (double& cell_v : v) cell_v += hides && k % 2 == 0 ? 0.08 : 0;
+      const double drifted = k < from ? 0 : std::min(1.0, static_cast<double>(k - from) / (until - from));
+      v[1] += 0.015 * drifted;
+      v[2] -= 0.015 * drifted;
+    });
+    for (const dp::LooseWire& wire : wires_in(pack)) ADD_FAILURE() << seed << ": " << wire.finding.because;
+  }
 }
 
 TEST(LooseWires, AreNotTheDigitsOfACoarseReading) {
