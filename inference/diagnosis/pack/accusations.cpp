@@ -44,6 +44,9 @@ NoiseModel noise_for(const PackState& s, std::size_t cell) {
   NoiseModel noise = s.noise;
   noise.white_v = std::max(noise.white_v, white_noise(s.fits[cell].difference_v, s.pack.current_a,
                                                       limits.noise.quiet_c * s.track.capacity_ah, noise.white_v));
+  if (s.own_noise.empty() || !s.own_noise[cell]) return noise;
+  for (double NoiseModel::*part : {&NoiseModel::white_v, &NoiseModel::fast_v, &NoiseModel::edge})
+    noise.*part = std::max(noise.*part, (*s.own_noise[cell]).*part);
   return noise;
 }
 
@@ -75,6 +78,29 @@ void learn_noise(PackState& s) {
     std::vector<double> values;
     for (const NoiseModel& n : found) values.push_back(n.*part);
     s.noise.*part = measurement::median(values);
+  }
+}
+
+/// A channel that is read at other moments than the typical ones has larger errors where the current changes: with the
+/// pack's noise its fit would follow them, with a charge or a capacity of its own. Such a cell is fitted again with its
+/// channel's noise, also from the start: the fit until now may be far away.
+void learn_own_noise(PackState& s) {
+  s.own_noise.assign(s.fits.size(), std::nullopt);
+  for (std::size_t c = 0; c < s.fits.size(); ++c) {
+    CellFit& fit = s.fits[c];
+    const auto is_misfit = [&] { return fit.square > limits.noise.misfit * static_cast<double>(fit.used); };
+    for (int round = 0; round < limits.noise.rounds && is_misfit(); ++round) {
+      CellFit now = fit;
+      now.noise.edge = std::max(now.noise.edge, starting_noise().edge);  // a search from far below ends elsewhere
+      s.own_noise[c] = noise_of(input_of(s, c), now);
+      now.theta = Vector::Zero();
+      now.theta[delay] = s.channels.cells[c].lag_s;
+      for (const Vector& start : {fit.theta, now.theta}) {
+        CellFit again = fit_cell(input_of(s, c), start, prior_of(s, c, true), noise_for(s, c));
+        if (start == fit.theta || again.cost < now.cost) now = std::move(again);
+      }
+      fit = std::move(now);
+    }
   }
 }
 
@@ -141,9 +167,11 @@ void leave_moving_rows_out(PackState& s) {
   s.track.uses_moving = false;
   s.healthy = least_spread(s.track.r0_ohm);
   s.noise = starting_noise();
+  s.own_noise.clear();
   fit_all(s, true, limits.done.first, limits.done.noise);
   learn_noise(s);
   fit_all(s, true, limits.done.noise, limits.done.second);
+  learn_own_noise(s);
 }
 
 /// The OCV bends, and a load with a period of its own is alike a period later: a fit from the state of the neighbours
@@ -203,6 +231,7 @@ void fit_and_accuse(PackState& s) {
   for (std::size_t c = 0; c < s.fits.size(); ++c) start_elsewhere(s, c);
   learn_noise(s);
   fit_all(s, true, done.noise, done.second);
+  learn_own_noise(s);
   // Of held channels only the rows with a new reading count: they are few, and their moments are known. Rows far apart
   // do not show whether the current was constant between them. The learned error at steps says whether the channels are
   // read at other moments: where they are not, a current that changes in each row is as good as any.

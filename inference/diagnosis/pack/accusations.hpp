@@ -22,6 +22,8 @@ struct PackState {
   std::vector<PackFinding> bad_sensors;
   std::vector<CellFit> fits;
   NoiseModel noise;
+  std::vector<std::optional<NoiseModel>>
+      own_noise;  ///< by cell, of a channel whose errors are larger than the typical ones'
   Vector healthy = Vector::Zero();
   std::vector<Accusation> late;  ///< channels that lag by whole rows: certain
   std::vector<Accusation> accused;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -223,6 +224,10 @@ void weigh_by_misfit(CellFit& fit) {
   }
 }
 
+double square_of_prior(const Vector& theta, const Vector& prior) {
+  return (theta.array() / prior.array()).square().sum();
+}
+
 /// Linearised and whitened around theta; cost: -2 log posterior but for a constant.
 CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, const NoiseModel& noise) {
   CellFit fit;
@@ -235,14 +240,44 @@ CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, 
   for (std::size_t k = 0; k < fit.residual_v.size(); ++k) {
     if (l.usable[k] != 0) fit.residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
   }
+  fit.lasting_v2 = l.noise.slow_v2;
+  for (double& v2 : fit.lasting_v2) v2 += noise.slow_v * noise.slow_v;
   whitener.whiten(l.columns);
   fit.used = whitener.used();
   fit.white = std::move(l.columns);
   fit.soc = std::move(l.soc);
+  fit.row_noise = std::move(l.noise);
   fit.square = fit.white.col(parameter_count).squaredNorm();
   add_information(input, fit);
-  fit.cost = fit.square + whitener.log_determinant() + (theta.array() / prior.array()).square().sum();
+  fit.cost = fit.square + whitener.log_determinant() + square_of_prior(theta, prior);
   return fit;
+}
+
+/// The fit at theta, if its cost is less.
+std::optional<Improved<CellFit>> improved_by(const FitInput& input, const CellFit& best, const Vector& theta,
+                                             const Vector& prior) {
+  CellFit next = around(input, theta, prior, best.noise);
+  const double gain = best.cost - next.cost;
+  if (!(gain > 0)) return std::nullopt;
+  return Improved<CellFit>{std::move(next), gain};
+}
+
+/// The fit at theta, if it explains the readings better with the noise that they have around `best`. The noise grows
+/// with the size of a delay or a resistance, whichever its sign: at 0 the cost has an edge that no step may get over.
+std::optional<Improved<CellFit>> improved_with_same_noise(const FitInput& input, const CellFit& best,
+                                                          const Vector& theta, const Vector& prior) {
+  const Linearised l = linearise(input, theta, best.noise.edge);
+  const Whitener whitener(best.noise, input.pack->time_s, best.row_noise, l.usable);
+  std::vector<double> residual_v(input.pack->rows(), 0.0);
+  for (std::size_t k = 0; k < residual_v.size(); ++k) {
+    if (l.usable[k] != 0) residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
+  }
+  whitener.whiten(0, residual_v);
+  double cost = square_of_prior(theta, prior);
+  for (const double v : residual_v) cost += v * v;
+  const double gain = best.square + square_of_prior(best.theta, prior) - cost;
+  if (!(gain > 0)) return std::nullopt;
+  return Improved<CellFit>{around(input, theta, prior, best.noise), gain};
 }
 
 Matrix normal_of(const Information& data, const Vector& prior) {
@@ -291,14 +326,21 @@ Vector starting_point(const FitInput& input, double lag_s) {
 }
 
 CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior, const NoiseModel& noise) {
-  const auto at = [&](const Vector& theta) { return around(input, theta, prior, noise); };
   const auto normal = [&](const CellFit& fit) { return normal_of(fit.all(), prior); };
   const auto target = [&](const CellFit& fit) -> Vector { return normal(fit).ldlt().solve(fit.all().with_data); };
-  CellFit fit = damped_fit(at(start), &CellFit::theta, limits.fit.iterations, at, normal, target);
+  const auto fit_by = [&](CellFit from, const auto& improved_at) {
+    const auto improved = [&](const CellFit& best, const Vector& theta) {
+      return improved_at(input, best, theta, prior);
+    };
+    return damped_fit(std::move(from), &CellFit::theta, limits.fit.iterations, improved, normal, target);
+  };
+  CellFit fit = fit_by(around(input, start, prior, noise), improved_by);
+  if (fit.theta == start) fit = fit_by(std::move(fit), improved_with_same_noise);
   weigh_by_misfit(fit);
   add_information(input, fit);
   fit.white.resize(0, 0);
   fit.soc = {};
+  fit.row_noise = RowNoise();
   return fit;
 }
 

@@ -147,6 +147,7 @@ PackDiagnosis diagnose_pack(const model::CellParameters<>& cell, PackRecording& 
               .bad_sensors = {},
               .fits = {},
               .noise = {},
+              .own_noise = {},
               .late = {},
               .accused = {},
               .staggered = {}};

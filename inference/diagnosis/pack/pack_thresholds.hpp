@@ -94,6 +94,8 @@ struct PackThresholds {
     double shape_share = 0.02;  ///< error of a resistance's course, as a share of what a fault adds to it
     double jitter_s = 0.002;    ///< of the sampling
     std::size_t cells = 8;      ///< from which the noise is learned
+    double misfit = 1.5;        ///< mean square over the expected one from which on a channel has a noise of its own
+    int rounds = 3;             ///< of such a channel's noise and fit
     std::array<double, 4> factors = {2, 1.41, 1.19, 1.09};  ///< of the search, in this order
     double least_v = 2e-5, most_v = 0.1;                    ///< of each part
   } noise;
@@ -213,11 +215,10 @@ struct PackThresholds {
   } misfit;
 
   struct Unexplained {
-    double block_s = 300;    ///< over which unexplained differences are averaged
-    double ratio = 3;        ///< of the mean square to that of the median cell
-    double scales = 8;       ///< times the robust spread of its logarithm over the cells
-    std::size_t cells = 6;   ///< at least
-    double least_v = 0.002;  ///< RMS of a block mean that is worth a look
+    double block_s = 300;      ///< over which differences are averaged
+    double over_expected = 5;  ///< RMS of such means over what the pack's noise lasts
+    double least_v = 0.002;    ///< RMS of such means that is worth a look
+    std::size_t cells = 6;     ///< for a spread over the cells, at least
   } unexplained;
 
   /// Of the progress that is shown.

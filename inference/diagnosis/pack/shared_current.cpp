@@ -5,6 +5,8 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <utility>
 
 #include <Eigen/Cholesky>
 
@@ -75,10 +77,15 @@ Normal normal_of(const Around& a, const Unknowns& prior) {
 }
 
 Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
-  const auto at = [&](const Unknowns& u) { return around(p, u, prior, noise); };
+  const auto improved = [&](const Around& best, const Unknowns& u) -> std::optional<Improved<Around>> {
+    Around next = around(p, u, prior, noise);
+    const double gain = best.cost - next.cost;
+    if (!(gain > 0)) return std::nullopt;
+    return Improved<Around>{std::move(next), gain};
+  };
   const auto normal = [&](const Around& fit) { return normal_of(fit, prior); };
   const auto target = [&](const Around& fit) -> Unknowns { return normal(fit).ldlt().solve(fit.with_data); };
-  return damped_fit(at(from), &Around::u, of_shared.iterations, at, normal, target);
+  return damped_fit(around(p, from, prior, noise), &Around::u, of_shared.iterations, improved, normal, target);
 }
 
 /// A coarse search over start and offset: the OCV bends, and a fit may end where another one is better.

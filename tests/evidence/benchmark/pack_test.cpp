@@ -1,6 +1,7 @@
 // Simulated packs with planted faults: the cell and the cause are named, and nothing else.
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string_view>
 
 #include <gtest/gtest.h>
@@ -16,19 +17,28 @@ namespace {
 
 namespace truth = benchmark::truth;
 
-benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {}) {
-  const truth::PackCase c = truth::make_pack(seed, index, healthy, only);
+diagnosis::pack::PackDiagnosis diagnosis_of(const truth::PackCase& c) {
   measurement::Recording r;
   r.time_s = c.recording.time_s;
   r.current_a = c.recording.current_a;
   for (const auto& v : c.recording.cell_v) r.cell_voltage_v.emplace_back(v);
   for (const auto& t : c.recording.sensor_c) r.cell_temperature_c.emplace_back(t);
-  r.pack_voltage_v = c.recording.pack_v;
+  if (!c.recording.pack_v.empty()) r.pack_voltage_v = c.recording.pack_v;
   workflow::PackOptions options;
   options.initial_soc = c.given_initial_soc;
   options.shared = false;
   const auto cell = files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
-  return benchmark::score_pack(c, workflow::diagnose_pack(cell, r, options).diagnosis);
+  return workflow::diagnose_pack(cell, r, options).diagnosis;
+}
+
+benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {}) {
+  const truth::PackCase c = truth::make_pack(seed, index, healthy, only);
+  return benchmark::score_pack(c, diagnosis_of(c));
+}
+
+/// A healthy pack of 14 cells, three hours in rows of 1 s.
+truth::PackCase healthy_under_a_pump() {
+  return truth::make_slow_pack(4127, 16, true, {}, {.load = truth::PackLoad::pump, .rows_s = 1, .hours = 3});
 }
 
 TEST(Pack, NamesACellWithLessChargeAmongChannelsThatAreReadOneAfterTheOther) {
@@ -78,6 +88,24 @@ TEST(Pack, NamesNothingInAHealthyPack) {
   const benchmark::PackOutcome o = outcome_of(2, 0, true);
   EXPECT_EQ(o.verdict, "NO_MISMATCH");
   EXPECT_TRUE(o.wrong.empty()) << o.statement;
+}
+
+TEST(Pack, LeavesACellInPeaceWhoseFitHasToMoveAgainstAGrowingNoise) {
+  const auto d = diagnosis_of(healthy_under_a_pump());
+  EXPECT_EQ(d.verdict, diagnosis::Verdict::no_mismatch) << d.statement;
+}
+
+TEST(Pack, SaysThatACellIsUnknownWhoseReadingDriftsUpAndDown) {
+  truth::PackCase c = healthy_under_a_pump();
+  constexpr std::size_t cell = 6;
+  constexpr double drift_v = 0.012, period_s = 3'000;
+  for (std::size_t k = 0; k < c.recording.time_s.size(); ++k)
+    c.recording.cell_v[cell][k] += drift_v * std::sin(2 * std::numbers::pi * c.recording.time_s[k] / period_s);
+  const auto d = diagnosis_of(c);
+  EXPECT_EQ(d.verdict, diagnosis::Verdict::unknown) << d.statement;
+  ASSERT_EQ(d.unexplained.size(), 1) << d.statement;
+  EXPECT_EQ(d.unexplained[0].cell, cell);
+  EXPECT_TRUE(d.findings.empty()) << d.statement;
 }
 
 }  // namespace
