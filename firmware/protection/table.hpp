@@ -20,6 +20,7 @@
 #include <cstdint>
 
 #include "protection/faults.hpp"
+#include "protection/overload.hpp"
 #include "protection/pack_design.hpp"
 #include "protection/rule.hpp"
 
@@ -126,13 +127,14 @@ constexpr Table protection_table(const PackDesign& d) {
            .reaction = forbid_discharge,
            .why = "as for a cell, by a second measurement"}),
       row({.fault = charge_overcurrent,
-           .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
-           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = full_overload_us, .delay_s = 0},
+           .released = {.threshold = full_overload_us / 2, .after_s = 30, .recovery = automatic},
            .reaction = forbid_charge,
            .why = "the integral is the delay: 11 s at twice the limit, 29 s at 1.5 times the limit"}),
       row({.fault = discharge_overcurrent,
-           .raised = {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
-           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .raised =
+               {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = full_overload_us, .delay_s = 0},
+           .released = {.threshold = full_overload_us / 2, .after_s = 30, .recovery = automatic},
            .reaction = forbid_discharge,
            .why = "as for the charge current"}),
       row({.fault = short_circuit,

@@ -158,6 +158,7 @@ std::string cell_text(const CellFile& file) {
                                  quoted(file.source));
   Writer writer(text, file.sources);
   visit_cell(writer, file.parameters);
+  visit_pulses(writer, file.pulses);
   for (const TemperatureTable& at : file.at_temperature) {
     text += "\n[[at_temperature]]\n";
     writer.number("temperature_c", at.temperature_c);
@@ -303,6 +304,7 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   read_identity(top, file);
   Reader reader(top, file.sources);
   visit_cell(reader, file.parameters);
+  visit_pulses(reader, file.pulses);
   reader.finish();
   for (TomlTable& table : top.tables("at_temperature"))
     file.at_temperature.push_back(read_temperature_table(table, file));
@@ -314,7 +316,9 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   for (const char* kind : {"mechanism", "instrument"}) top.has(kind);  // known; read once the capacity is checked
   top.finish();
 
-  if (const model::CellFault fault = model::first_fault(file.parameters); fault.what != nullptr) {
+  for (const model::CellFault& fault :
+       {model::first_fault(file.parameters), model::first_fault(file.pulses, file.parameters.limits)}) {
+    if (fault.what == nullptr) continue;
     throw BadInput(path, top.line(fault.key, fault.index),
                    std::string("'") + fault.key + "' is out of range, expected " + fault.what);
   }
