@@ -190,6 +190,15 @@ constexpr bool temperatures_are_wider_and_slower(const SecondLine& chip, const p
          chip.discharge_hot_c >= celsius(overtemperature) + 3 && slower(overtemperature) &&
          chip.charge_cold_c <= celsius(charge_undertemperature) - 3 && slower(charge_undertemperature);
 }
+/// SHUTDOWN of a hot chip opens main plus under load. The firmware has opened before, even if the die warms up by 2
+/// K/s.
+constexpr bool die_opens_before_shutdown(std::span<const hal::bq76952::Setting> settings,
+                                         const protection::Rules& rules) {
+  constexpr double rise_k_per_s = 2;
+  const protection::Rule& row = rule_of(rules, protection::Fault::front_end_hot);
+  return 0.01 * row.threshold + rise_k_per_s * (1e-6 * row.delay_us + grace_s + chain_s) <=
+         static_cast<std::int8_t>(hal::bq76952::value_of(settings, 0x9244));
+}
 constexpr bool host_silence_is_slower(const SecondLine& chip, const protection::Rules& rules) {
   return chip.host_silence_s > 1e-6 * rule_of(rules, protection::Fault::samples_missing).threshold;
 }

@@ -344,6 +344,11 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = warn,
            .why = "a monitor needs up to 20 s for its first value"}),
+      row({.fault = front_end_hot,
+           .raised = {.quantity = Quantity::front_end_cdegc, .sense = above, .threshold = in_centi(95), .delay_s = 2},
+           .released = {.threshold = in_centi(85), .after_s = 60, .recovery = automatic},
+           .reaction = open,
+           .why = "a die warms up in minutes; at 110 °C the measuring chip shuts down and opens main plus under load"}),
   }};
 }
 

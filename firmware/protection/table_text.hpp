@@ -115,6 +115,8 @@ constexpr QuantityText text_of(Quantity q) {
       return {"warmest sensor", "°C", 1e2, 0};
     case Quantity::lowest_cdegc:
       return {"coldest sensor", "°C", 1e2, 0};
+    case Quantity::front_end_cdegc:
+      return {"die of the measuring chip", "°C", 1e2, 0};
     case Quantity::opposite_shift_uv:
       return {"opposite shift of neighbours", "V", 1e6, 3};
     case Quantity::spread_uv:
