@@ -8,7 +8,7 @@
 //                         recovery charge is possible above it
 //   charge overcurrent    1.2 times short circuit, or the end of      0.42 s
 //                         the comparator: at least 3 times the
-//                         continuous current
+//                         continuous current and 1.05 of a rated pulse
 //   discharge overcurrent 1.2 and 1.5 times short circuit, or the     0.42 s, 0.35 s
 //                         end of the comparator
 //   sustained overcurrent 2 times the continuous current              20 s, discharge; 36 s if the cell
@@ -67,7 +67,7 @@ constexpr double overload_opens_s(const protection::PackDesign& pack, double cur
       least_reading * current_a / (protection::overcurrent_from * pack.limits.discharge_current_max_a);
   const auto times_256 = std::min(static_cast<std::int32_t>(256 * over_l), protection::most_times_256);
   if (times_256 <= 256) return std::numeric_limits<double>::infinity();
-  const auto rate = static_cast<double>(protection::overload_rate(plan, times_256, true)) / 65'536;
+  const auto rate = static_cast<double>(protection::overload_rates(plan, times_256, true).largest()) / 65'536;
   return 1e-6 * protection::full_overload_us / rate + grace_s + chain_s;
 }
 
@@ -176,6 +176,14 @@ constexpr bool overcurrent_is_wider_and_slower(const SecondLine& chip, const pro
            chip.charge_overcurrent_s >= first_line_s(1, pack.sample_period_s))) &&
          slower(chip.overcurrent_a, chip.overcurrent_s) && slower(chip.high_overcurrent_a, chip.high_overcurrent_s) &&
          chip.short_circuit_a > row_a;
+}
+/// A charge pulse that the cell file rates is carried, with the error of the sensor, or is a short circuit for the
+/// first line, too.
+constexpr bool charge_overcurrent_is_above_rated_pulses(const SecondLine& chip, const protection::Rules& rules,
+                                                        const protection::PackDesign& pack) {
+  const double rated_a = std::max(pack.pulses.charge.for_10s_a, pack.pulses.charge.for_30s_a);
+  return chip.charge_overcurrent_a > 1e-6 * rule_of(rules, protection::Fault::short_circuit).threshold ||
+         chip.charge_overcurrent_a >= protection::overcurrent_from * rated_a;
 }
 constexpr bool sustained_is_wider_and_slower(const SecondLine& chip, const protection::PackDesign& pack) {
   return chip.sustained_s >= overload_opens_s(pack, chip.sustained_a);

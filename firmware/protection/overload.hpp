@@ -3,16 +3,19 @@
 //
 //   without ratings  rate = x - 1: a thermal replica after IEC 60255-149, without its exponential. At rest 30 s of
 //                    overload decay in 30 s. From rest, 2 L last 10 s and 1.41 L last 30 s.
-//   with ratings     of pulses for 10 s and 30 s, in the cell file. They bound this rate, so that a pulse lasts as long
-//                    as it is rated and no longer:
+//   with ratings     of pulses for 10 s and 30 s, in the cell file: the largest of three integrals
+//     time           a pulse lasts as long as it is rated and no longer. Its rate is s (x - 1), also below L, and
 //                      up to the rating for 30 s     at most 1
 //                      up to the rating for 10 s     at most 3
-//                      above the larger of both      at least 30: forbidden within a second
-//                    Where a rating is less than 1.41 L or 2 L, the rate is s (x - 1), s > 1, with which it ends after
-//                    its time. A reading of 1.05 of a rating still counts as the rating. Below L the rate is r (x - 1):
-//                    r <= 1 is the smallest quotient of rate and x - 1 above L. So h / r is never less than the heat,
-//                    and from one full integral to the next the mean square of any current is at most L^2.
-//   in the cold      below the temperature from which the ratings hold, or without any: the larger of both rates
+//                      above the larger of both      30, or x - 1 if that is more: forbidden within a second
+//                    s >= 1 is 1, or what ends a rating of less than 1.41 L or 2 L after its time. A reading of 1.05 of
+//                    a rating still counts as the rating. It is never more than s times the heat of rated pulses, so
+//                    pulses whose heat has decayed leave nothing. It ends at 30 s: what flows on is heat, and a truck
+//                    that reacts after a second does not pay for minutes.
+//     heat           r (x - 1): r <= 1 is the smallest quotient of the rates above and x - 1 above L. From one full
+//                    integral to the next the mean square of any current is at most L^2, beyond 30 s as well.
+//     cold           x - 1 below the temperature from which the ratings hold, or without any; above it only decays. So
+//                    nothing lasts longer in the cold than without ratings
 //
 // Currents count as multiples of L, so ratings follow a limit that a workshop lowers. A derated limit is enforced by
 // the charge above it (excess_charge.hpp), which knows no ratings. Integers only.
@@ -66,21 +69,49 @@ constexpr OverloadPlan overload_plan(const model::PulseRating& rating, double co
   return plan;
 }
 
-/// Rate of the integral in 1/65536. times_256: current over L in this direction, 0 to most_times_256. holds: the cells
-/// are warm enough for the ratings.
-constexpr std::int64_t overload_rate(const OverloadPlan& plan, std::int32_t times_256, bool holds) {
+/// Rates in 1/65536.
+struct OverloadRates {
+  std::int64_t time, heat, cold;
+
+  constexpr std::int64_t largest() const { return std::max({time, heat, cold}); }
+};
+
+/// times_256: current over L in this direction, 0 to most_times_256. holds: the cells are warm enough for the ratings.
+constexpr OverloadRates overload_rates(const OverloadPlan& plan, std::int32_t times_256, bool holds) {
   constexpr std::int64_t one = 65'536;
   const std::int64_t square = std::int64_t{times_256} * times_256 - one;
-  if (square <= 0) return (square * plan.recovery_32768ths) >> 15;
-  if (!plan.rated()) return square;
-  std::int64_t rate = (square * plan.slope_64ths) >> 6;
-  if (times_256 <= plan.for_30s_256ths)
-    rate = std::min(rate, one);
-  else if (times_256 <= plan.for_10s_256ths)
-    rate = std::min(rate, 3 * one);
-  else
-    rate = std::max(rate, 30 * one);
-  return holds ? rate : std::max(rate, square);
+  std::int64_t time = (square * plan.slope_64ths) >> 6;
+  if (!plan.rated() || square <= 0) {
+  } else if (times_256 <= plan.for_30s_256ths) {
+    time = std::min(time, one);
+  } else if (times_256 <= plan.for_10s_256ths) {
+    time = std::min(time, 3 * one);
+  } else {
+    time = std::max(square, 30 * one);
+  }
+  return {time, (square * plan.recovery_32768ths) >> 15, holds ? std::min<std::int64_t>(square, 0) : square};
 }
+
+class OverloadIntegral {
+ public:
+  /// step_us: time since the last call.
+  constexpr void update(const OverloadPlan& plan, std::int32_t times_256, bool holds, std::uint32_t step_us) {
+    const OverloadRates rates = overload_rates(plan, times_256, holds);
+    add(time_us_, rates.time, step_us, full_overload_us + 1);  // the row compares with >
+    add(heat_us_, rates.heat, step_us, most_us);
+    add(cold_us_, rates.cold, step_us, most_us);
+  }
+  /// Value that the row compares [us].
+  constexpr std::int32_t value_us() const { return std::max({time_us_, heat_us_, cold_us_}); }
+
+ private:
+  static constexpr std::int32_t most_us = 2'000'000'000;
+
+  static constexpr void add(std::int32_t& us, std::int64_t rate, std::uint32_t step_us, std::int32_t most) {
+    us = static_cast<std::int32_t>(std::clamp<std::int64_t>(us + ((rate * step_us) >> 16), 0, most));
+  }
+
+  std::int32_t time_us_ = 0, heat_us_ = 0, cold_us_ = 0;
+};
 
 }  // namespace bms::protection

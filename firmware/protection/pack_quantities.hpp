@@ -77,7 +77,6 @@ class PackQuantities {
  public:
   static constexpr std::int32_t stuck_move_uv = 20'000, stuck_move_cdegc = 500;
   static constexpr std::uint8_t stuck_after = 5;
-  static constexpr std::int32_t max_overload_i2t_us = 2'000'000'000;
 
   constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
 
@@ -164,24 +163,21 @@ class PackQuantities {
     at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : measurement::no_reading;
     if (known) {
       const std::int32_t coldest_cdegc = at(q, Quantity::lowest_cdegc);  // unknown: less than any temperature
-      integrate_overload(charge_overload_i2t_us_, limits_.charge_overload, current_ua / limits_.charge_ua_256th,
-                         coldest_cdegc, step_us);
-      integrate_overload(discharge_overload_i2t_us_, limits_.discharge_overload,
-                         -current_ua / limits_.discharge_ua_256th, coldest_cdegc, step_us);
+      integrate(charge_overload_, limits_.charge_overload, current_ua / limits_.charge_ua_256th, coldest_cdegc,
+                step_us);
+      integrate(discharge_overload_, limits_.discharge_overload, -current_ua / limits_.discharge_ua_256th,
+                coldest_cdegc, step_us);
     }
-    at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_i2t_us_ : measurement::no_reading;
-    at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_i2t_us_ : measurement::no_reading;
+    at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_.value_us() : measurement::no_reading;
+    at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_.value_us() : measurement::no_reading;
   }
 
   /// times_256: current / limit in 1/256, negative in the other direction. A reading at the end of the sensor's range
   /// counts as this current.
-  static constexpr void integrate_overload(std::int32_t& overload_i2t_us, const OverloadPlan& plan,
-                                           std::int32_t times_256, std::int32_t coldest_cdegc, std::uint32_t step_us) {
-    const std::int64_t rate =
-        overload_rate(plan, std::clamp(times_256, std::int32_t{0}, most_times_256), coldest_cdegc >= plan.from_cdegc);
-    const std::int64_t more_us = (rate * step_us) >> 16;
-    overload_i2t_us =
-        static_cast<std::int32_t>(std::clamp<std::int64_t>(overload_i2t_us + more_us, 0, max_overload_i2t_us));
+  static constexpr void integrate(OverloadIntegral& overload, const OverloadPlan& plan, std::int32_t times_256,
+                                  std::int32_t coldest_cdegc, std::uint32_t step_us) {
+    overload.update(plan, std::clamp(times_256, std::int32_t{0}, most_times_256), coldest_cdegc >= plan.from_cdegc,
+                    step_us);
   }
 
   constexpr void update_temperatures(const std::array<std::int16_t, measurement::max_temperatures>& all,
@@ -214,7 +210,8 @@ class PackQuantities {
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
   std::array<std::array<Repeats, 2>, measurement::max_temperatures> temperature_{};  ///< against the two middle ones
-  std::int32_t charge_overload_i2t_us_ = 0, discharge_overload_i2t_us_ = 0, sum_uv_ = measurement::no_reading;
+  OverloadIntegral charge_overload_, discharge_overload_;
+  std::int32_t sum_uv_ = measurement::no_reading;
 };
 
 }  // namespace bms::protection

@@ -307,8 +307,9 @@ constexpr Table protection_table(const PackDesign& d) {
            .raised = {.quantity = largest_excess_us, .sense = above, .threshold = in_micro(10.8), .delay_s = 0},
            .released = {.threshold = in_micro(10.2), .after_s = 10, .recovery = automatic},
            .reaction = open_now,
-           .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
-                  "released after two minutes, as the next charge above the allowed current opens again at once"}),
+           .why =
+               "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
+               "released after two minutes at most, as the next charge above the allowed current opens again at once"}),
       row({.fault = supply_dip,
            .raised = {.quantity = supply_dips, .sense = above, .threshold = 0, .delay_s = 0},
            .released = {.threshold = 0, .after_s = 1, .recovery = automatic},

@@ -36,7 +36,8 @@ struct Chip {
   constexpr bool wider_and_slower() const {
     return overvoltage_is_wider_and_slower(line, rules, period_s) &&
            undervoltage_is_wider_and_slower(line, rules, period_s) &&
-           overcurrent_is_wider_and_slower(line, rules, pack) && sustained_is_wider_and_slower(line, pack) &&
+           overcurrent_is_wider_and_slower(line, rules, pack) &&
+           charge_overcurrent_is_above_rated_pulses(line, rules, pack) && sustained_is_wider_and_slower(line, pack) &&
            temperatures_are_wider_and_slower(line, rules) && line.all_on && host_silence_is_slower(line, rules) &&
            current_is_in_range(board, rules) && hal::bq76952::possible(board);
   }
@@ -242,6 +243,25 @@ TEST(SecondLineOfTheFrontEnd, LeavesRatedPulsesToTheFirstLineWithTheSameThreshol
   Chip fast = table9;
   fast.pack.pulses.discharge = {18, 12};
   EXPECT_FALSE(fast.wider_and_slower()) << "12 A for 20 s, and the first line allows 30 s";
+}
+
+/// At 0.1 mOhm its comparator ends at 1,240 A: 4.4 times 280 A, but 3.1 times 400 A.
+TEST(SecondLineOfTheFrontEnd, AChargePulseIsRatedBelowTheChipsOvercurrentOrTheImageDoesNotCompile) {
+  const auto fits = [](double limit_a, model::PulseRating charge) {
+    Chip chip(lfp(limit_a), limit_a);
+    chip.pack.pulses.charge = charge;
+    EXPECT_TRUE(overcurrent_is_wider_and_slower(chip.line, chip.rules, chip.pack)) << "the shunt is not the reason";
+    EXPECT_EQ(charge_overcurrent_is_above_rated_pulses(chip.line, chip.rules, chip.pack), chip.wider_and_slower());
+    return chip.wider_and_slower();
+  };
+  EXPECT_TRUE(fits(400, {0, 0}));
+  EXPECT_TRUE(fits(400, {1'180, 800}));
+  EXPECT_FALSE(fits(400, {1'182, 800})) << "1,241 A with the error of the sensor";
+  EXPECT_FALSE(fits(400, {0, 1'400}));
+  EXPECT_TRUE(fits(280, {1'180, 0}));
+  EXPECT_FALSE(fits(280, {1'300, 0}));
+  EXPECT_TRUE(fits(100, {480, 300}));
+  EXPECT_TRUE(fits(100, {1'000, 300})) << "above short circuit the first line opens, too";
 }
 
 /// What is off stands in the safety file by its name.
