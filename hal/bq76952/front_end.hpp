@@ -135,7 +135,7 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
-  std::int16_t die_cdegc_ = 0;
+  std::int16_t die_cdegc_ = measurement::no_temperature;
   std::int32_t dc_link_uv_ = 0;
   std::uint8_t scan_age_ = 0;  ///< samples since all inputs were measured
   std::uint32_t charge_time_s_ = 0;

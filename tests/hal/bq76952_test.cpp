@@ -346,6 +346,7 @@ TEST_F(Bq76952, AfterARestartOfOnlyThisCoreAConfiguredChipIsNotConfiguredAgain) 
   start();
   const auto set_config = std::count(model.commands.begin(), model.commands.end(), 0x0090);
   FrontEnd again{configuration};
+  EXPECT_EQ(again.die_cdegc(), measurement::no_temperature) << "before the first sample";
   measurement::PackSample<16> first;
   int samples = 0;
   for (; samples < 10 && first.current_ua == measurement::no_reading; ++samples) {

@@ -189,6 +189,11 @@ TEST(CellFile, ReadsWritesAndChecksPulseRatings) {
               HasSubstr("'pulses.temperature_min_c'"));
   EXPECT_THAT(cell_refusal(replaced(text, "temperature_min_c = 25.0\n", "")),
               HasSubstr("'pulses.temperature_min_c' is missing"));
+  EXPECT_THAT(cell_refusal(replaced(text, "charge_10s_a = 12.0", "charge_10s_a = 0")),
+              HasSubstr("'pulses.charge_10s_a' is 0, expected a current, or no such key"));
+  std::string none = replaced(text, "charge_10s_a = 12.0\n", "");
+  for (const char* line : {"discharge_10s_a = 18.5\n", "discharge_30s_a = 13.0\n"}) none = replaced(none, line, "");
+  EXPECT_THAT(cell_refusal(none), HasSubstr("'pulses' rates no current, expected charge_10s_a,"));
   EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a", "discharge_60s_a")), HasSubstr("discharge_60s_a"));
 }
 
