@@ -6,7 +6,8 @@
 
 namespace bms::firmware {
 
-constexpr protection::PackDesign board_design(const model::Limits& limits, double capacity_ah) {
+constexpr protection::PackDesign board_design(const model::Limits& limits, double capacity_ah,
+                                              const model::PulseRatings& pulses = {}) {
   return {.limits = limits,
           .capacity_ah = capacity_ah,
           .cells = hal::pack_cells,
@@ -17,7 +18,8 @@ constexpr protection::PackDesign board_design(const model::Limits& limits, doubl
           .dc_link = hal::has_dc_link,
           .precharge_time_constant_s = hal::precharge_s,
           .bleed_ohm = hal::bleed_ohm,
-          .current_range_a = hal::current_range_a};
+          .current_range_a = hal::current_range_a,
+          .pulses = pulses};
 }
 
 /// Returns true for values with which the checks of the precharge work: a sample comes within half a time constant, and

@@ -7,6 +7,6 @@
 namespace bms::firmware {
 
 inline constexpr protection::PackDesign board_pack =
-    board_design(generated::parameters.limits, generated::parameters.capacity_ah);
+    board_design(generated::parameters.limits, generated::parameters.capacity_ah, generated::pulses);
 
 }  // namespace bms::firmware

@@ -43,6 +43,7 @@ inline Losses read_hardware(std::int32_t fitted, BoardStatus& board, protection:
     inputs.contact_lost = contacts.losses != 0;
   }
   inputs.second_line = hal::second_line_trips();
+  inputs.front_end_cdegc = hal::front_end_health().die_cdegc;
   if (has(parameters::second_current_fitted)) {
     inputs.second_current_fitted = hal::second_current_fitted();
     inputs.second_current_ua = hal::second_current_ua();

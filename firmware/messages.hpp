@@ -186,7 +186,7 @@ template <class Message>
 constexpr bool bits_follow_each_other() {
   unsigned next = 16;
   bool follow = true;
-  Message{}.each([&](const char*, const char*, const std::uint32_t&, const can::SignalLayout& s) {
+  Message{}.each([&](const char*, const char*, const auto&, const can::SignalLayout& s) {
     if (s.bits == 1) follow = follow && s.start == next++;
   });
   return follow;
@@ -214,15 +214,25 @@ constexpr BitMessage<can::Faults> faults(const protection::Decision& d) {
 }
 constexpr BitMessage<can::MoreFaults> more_faults(const protection::Decision& d) { return {d.faults >> 32}; }
 
+/// The temperature as the signal DieTemperature: 2 degrees C a step, within its range. 0 is not known, as in the frames
+/// of firmware that does not send it.
+constexpr std::uint32_t die_temperature(std::int16_t cdegc) {
+  constexpr std::int32_t zero_cdegc = -6'200, step_cdegc = 200, least = 1, most = 127;
+  if (cdegc == measurement::no_temperature)
+    return static_cast<std::uint32_t>(can::FrontEnd::die_temperature_layout.invalid);
+  return static_cast<std::uint32_t>(std::clamp((cdegc - zero_cdegc + step_cdegc / 2) / step_cdegc, least, most));
+}
+
 /// trips: measurement::SecondLineTrip, in the order of the signals. Counters saturate.
 constexpr BitMessage<can::FrontEnd> front_end(std::uint32_t trips, const hal::FrontEndHealth& health) {
   using M = can::FrontEnd;
-  static_assert(M::state_layout.start == 12 && M::lost_layout.start == 32 && M::resets_layout.start == 40 &&
-                M::crc_errors_layout.start == 48);
+  static_assert(M::state_layout.start == 12 && M::die_temperature_layout.start == 25 && M::lost_layout.start == 32 &&
+                M::resets_layout.start == 40 && M::crc_errors_layout.start == 48);
   const std::uint32_t counters = std::min<std::uint32_t>(health.bad_crc, 65'535U) << 16 |
                                  std::min<std::uint32_t>(health.resets, 255U) << 8 |
                                  std::min<std::uint32_t>(health.lost, 255U);
-  return {std::uint64_t{counters} << 16 | trips, static_cast<std::uint8_t>(health.state)};
+  return {std::uint64_t{counters} << 16 | die_temperature(health.die_cdegc) << 9 | trips,
+          static_cast<std::uint8_t>(health.state)};
 }
 
 constexpr can::ContactorState contactor_state(const protection::Decision& d) {

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 
+#include "measurement/sample.hpp"
 #include "measurement/second_line.hpp"
 
 namespace bms::hal {
@@ -43,6 +44,7 @@ struct FrontEndHealth {
   std::uint32_t lost = 0;    ///< times that measuring ended
   std::uint32_t resets = 0;  ///< resets of the chip while measuring
   std::uint32_t bad_crc = 0;
+  std::int16_t die_cdegc = measurement::no_temperature;  ///< of the warmer chip [0.01 degrees C], of the last sample
 };
 FrontEndHealth front_end_health();
 

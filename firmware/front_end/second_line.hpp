@@ -8,10 +8,11 @@
 //                         recovery charge is possible above it
 //   charge overcurrent    1.2 times short circuit, or the end of      0.42 s
 //                         the comparator: at least 3 times the
-//                         continuous current
+//                         continuous current and 1.05 of a rated pulse
 //   discharge overcurrent 1.2 and 1.5 times short circuit, or the     0.42 s, 0.35 s
 //                         end of the comparator
-//   sustained overcurrent 2 times the continuous current              20 s, discharge
+//   sustained overcurrent 2 times the continuous current              20 s, discharge; 36 s if the cell
+//                                                                     file rates this current for 30 s
 //   hot                   5 K above charge overtemperature and        20 s
 //                         above overtemperature
 //   cold                  5 K below charge undertemperature           20 s, charge
@@ -27,8 +28,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
+#include <limits>
 
 #include "hal/bq76952/configuration.hpp"
+#include "protection/overload.hpp"
 #include "protection/table.hpp"
 
 namespace bms::firmware {
@@ -37,6 +41,7 @@ inline constexpr double voltage_margin_v = 0.02, slower_by_s = 0.8;
 inline constexpr double overcurrent_ratio = 1.2, high_overcurrent_ratio = 1.5, short_circuit_ratio = 2;
 inline constexpr double sustained_ratio = 2, sustained_delay_s = 20;  ///< of the continuous discharge current
 inline constexpr double least_charge_ratio = 3;                       ///< of the continuous charge current
+inline constexpr double grace_s = 5, chain_s = 0.5;                   ///< of the first line, and of its samples
 inline constexpr int temperature_margin_c = 5;
 inline constexpr std::uint8_t temperature_delay_s = 20;
 inline constexpr double overcurrent_delay_s = 0.42, high_overcurrent_delay_s = 0.35;
@@ -50,6 +55,29 @@ constexpr double first_line_s(double ratio, double sample_period_s) {
 
 constexpr const protection::Rule& rule_of(const protection::Rules& rules, protection::Fault fault) {
   return rules[static_cast<std::size_t>(fault)];
+}
+
+/// Time after which the first line has opened under this discharge current, by its overload integral and its grace
+/// time. A calibration may lower a reading by 5 %.
+constexpr double overload_opens_s(const protection::PackDesign& pack, double current_a) {
+  constexpr double least_reading = 0.95;
+  const protection::OverloadPlan plan = protection::overload_plan(
+      pack.pulses.discharge, pack.limits.discharge_current_max_a, pack.pulses.temperature_min_c);
+  const double over_l =
+      least_reading * current_a / (protection::overcurrent_from * pack.limits.discharge_current_max_a);
+  const auto times_256 = std::min(static_cast<std::int32_t>(256 * over_l), protection::most_times_256);
+  if (times_256 <= 256) return std::numeric_limits<double>::infinity();
+  const auto rate = static_cast<double>(protection::overload_rates(plan, times_256, true).largest()) / 65'536;
+  return 1e-6 * protection::full_overload_us / rate + grace_s + chain_s;
+}
+
+/// The threshold stays where it is; the chip waits longer if the cell file rates this current for longer. The chip's
+/// threshold is a whole number of steps.
+constexpr double sustained_delay(const protection::PackDesign& pack) {
+  constexpr double step = 0.02;
+  const double first_s = overload_opens_s(pack, (1 - step) * sustained_ratio * pack.limits.discharge_current_max_a);
+  const auto whole_s = static_cast<double>(static_cast<int>(first_s));
+  return std::max(sustained_delay_s, whole_s < first_s ? whole_s + 1 : whole_s);
 }
 
 /// Board around the chip for this pack, the lower one of two. rules: those of its table.
@@ -71,7 +99,7 @@ constexpr hal::bq76952::Board front_end_board(const protection::PackDesign& pack
           .high_overcurrent_delay_s = high_overcurrent_delay_s,
           .short_circuit_a = std::max(short_circuit_ratio * short_a, pack.closing_current_max_a),
           .sustained_a = sustained_ratio * pack.limits.discharge_current_max_a,
-          .sustained_delay_s = sustained_delay_s,
+          .sustained_delay_s = sustained_delay(pack),
           .charge_hot_c = celsius(charge_overtemperature) + temperature_margin_c,
           .discharge_hot_c = celsius(overtemperature) + temperature_margin_c,
           .charge_cold_c = celsius(charge_undertemperature) - temperature_margin_c,
@@ -149,18 +177,19 @@ constexpr bool overcurrent_is_wider_and_slower(const SecondLine& chip, const pro
          slower(chip.overcurrent_a, chip.overcurrent_s) && slower(chip.high_overcurrent_a, chip.high_overcurrent_s) &&
          chip.short_circuit_a > row_a;
 }
-/// The overload integral of the first line forbids, and opens after its grace time of five seconds. A calibration may
-/// lower a reading.
-constexpr bool sustained_is_wider_and_slower(const SecondLine& chip, const protection::Rules& rules,
-                                             const protection::PackDesign& pack) {
-  constexpr double counts_from = 1.05, least_reading = 0.95, grace_s = 5, chain_s = 0.5;
-  const double times = least_reading * chip.sustained_a / (counts_from * pack.limits.discharge_current_max_a);
-  const double heat_s = 1e-6 * rule_of(rules, protection::Fault::discharge_overcurrent).threshold;
-  return times > 1 && chip.sustained_s >= heat_s / (times * times - 1) + grace_s + chain_s;
+/// A charge pulse that the cell file rates is carried, with the error of the sensor, or is a short circuit for the
+/// first line, too.
+constexpr bool charge_overcurrent_is_above_rated_pulses(const SecondLine& chip, const protection::Rules& rules,
+                                                        const protection::PackDesign& pack) {
+  const double rated_a = std::max(pack.pulses.charge.for_10s_a, pack.pulses.charge.for_30s_a);
+  return chip.charge_overcurrent_a > 1e-6 * rule_of(rules, protection::Fault::short_circuit).threshold ||
+         chip.charge_overcurrent_a >= protection::overcurrent_from * rated_a;
+}
+constexpr bool sustained_is_wider_and_slower(const SecondLine& chip, const protection::PackDesign& pack) {
+  return chip.sustained_s >= overload_opens_s(pack, chip.sustained_a);
 }
 constexpr bool temperatures_are_wider_and_slower(const SecondLine& chip, const protection::Rules& rules) {
   using enum protection::Fault;
-  constexpr double grace_s = 5, chain_s = 0.5;
   const auto slower = [&](protection::Fault fault) {
     return chip.temperature_s >= 1e-6 * rule_of(rules, fault).delay_us + grace_s + chain_s;
   };
@@ -168,6 +197,15 @@ constexpr bool temperatures_are_wider_and_slower(const SecondLine& chip, const p
   return chip.charge_hot_c >= celsius(charge_overtemperature) + 3 && slower(charge_overtemperature) &&
          chip.discharge_hot_c >= celsius(overtemperature) + 3 && slower(overtemperature) &&
          chip.charge_cold_c <= celsius(charge_undertemperature) - 3 && slower(charge_undertemperature);
+}
+/// SHUTDOWN of a hot chip opens main plus under load. The firmware has opened before, even if the die warms up by 2
+/// K/s.
+constexpr bool die_opens_before_shutdown(std::span<const hal::bq76952::Setting> settings,
+                                         const protection::Rules& rules) {
+  constexpr double rise_k_per_s = 2;
+  const protection::Rule& row = rule_of(rules, protection::Fault::front_end_hot);
+  return 0.01 * row.threshold + rise_k_per_s * (1e-6 * row.delay_us + grace_s + chain_s) <=
+         static_cast<std::int8_t>(hal::bq76952::value_of(settings, 0x9244));
 }
 constexpr bool host_silence_is_slower(const SecondLine& chip, const protection::Rules& rules) {
   return chip.host_silence_s > 1e-6 * rule_of(rules, protection::Fault::samples_missing).threshold;

@@ -20,8 +20,11 @@ static_assert(current_is_in_range(board, rules), "the shunt cannot measure the c
 static_assert(overvoltage_is_wider_and_slower(chip, rules, hal::sample_period_s));
 static_assert(undervoltage_is_wider_and_slower(chip, rules, hal::sample_period_s));
 static_assert(overcurrent_is_wider_and_slower(chip, rules, board_pack), "the shunt is too large for this cell file");
-static_assert(sustained_is_wider_and_slower(chip, rules, board_pack));
+static_assert(charge_overcurrent_is_above_rated_pulses(chip, rules, board_pack),
+              "the cell file rates a charge pulse at which the front end opens: state less, or use a smaller shunt");
+static_assert(sustained_is_wider_and_slower(chip, board_pack));
 static_assert(temperatures_are_wider_and_slower(chip, rules));
+static_assert(die_opens_before_shutdown(board_settings, rules));
 static_assert(chip.all_on, "docs/safety/assumptions.md, L-24, names what is off");
 static_assert(host_silence_is_slower(chip, rules));
 static_assert(std::popcount(board.cell_inputs) == hal::bq76952::lower_cells(hal::pack_cells));

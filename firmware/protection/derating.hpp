@@ -122,7 +122,9 @@ class Derating {
   static constexpr std::int32_t ramp_towards(std::int32_t& allowed_ua, std::int32_t most_ua, std::int32_t share,
                                              std::int32_t model_ua, bool derate, std::uint32_t step_us) {
     std::int32_t target_ua = part(most_ua, static_cast<std::uint32_t>(share) << 10);
-    if (model_ua != measurement::no_reading) target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
+    // The model computes with 24 bits, so its limit may be some microamperes below that of the file: not derated.
+    if (model_ua != measurement::no_reading && model_ua < most_ua - most_ua / 1024)
+      target_ua = std::min(target_ua, std::max(model_ua, std::int32_t{0}));
     if (derate) target_ua /= 2;
     const std::int32_t down_ua =
         part(most_ua, std::min<std::uint32_t>(step_us, 1U << 20));  // 2^20 us instead of 1 s: 5 % slower

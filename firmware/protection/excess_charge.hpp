@@ -1,7 +1,9 @@
 // Charge above the allowed current, of each direction: how far a truck or charger has exceeded a derated or forbidden
 // current, in one piece or in bursts.
 //
-//   e += (I - 1.05 allowed - 0.005C) dt, not below 0, in seconds of 1C: 3.6 s are 0.1 % of the capacity
+//   e += (I - 1.05 allowed - 0.005C) dt, not below 0, in seconds of 1C: 3.6 s are 0.1 % of the capacity. Of the
+//   continuous limit, if that is lower: 4.9 times a limit of 0.3C are only 1.5C, and would flow for the grace time of
+//   5 s after the overload integral has forbidden them
 //
 //   1.05      errors of a 1 % sensor and a controller, as for the overload integral I2t
 //   0.005C    the leak: offset of a 0.5 % sensor. In any hour e receives at most its threshold and 18 s: the table
@@ -17,7 +19,7 @@
 // minutes.
 //
 // A current that is not derated at all adds nothing: the continuous limit has the overload integral I2t
-// (pack_quantities.hpp), which carries pulses above it. The leak goes on while the contactors are open. Integers only.
+// (overload.hpp), which carries pulses above it. The leak goes on while the contactors are open. Integers only.
 #pragma once
 
 #include <algorithm>
@@ -63,10 +65,12 @@ class ExcessCharge {
 
   constexpr void add(std::int32_t& excess_us, std::int32_t current_ua, std::int32_t allowed_ua, std::int32_t most_ua,
                      std::uint32_t step_us) const {
+    constexpr std::int32_t least_ua = 1;
+    const std::int32_t unit_ua = std::max(std::min(plan_->part_ua, most_ua >> 14), least_ua);
     const std::int32_t above_ua = current_ua > 0 ? current_ua - allowed_ua : 0, tolerance_ua = allowed_ua / 20;
     const bool counts = allowed_ua < most_ua && above_ua > tolerance_ua;
     if (!counts && excess_us == 0) return;
-    const std::int32_t rate = (counts ? (above_ua - tolerance_ua) / plan_->part_ua : 0) - leak;
+    const std::int32_t rate = ((counts ? above_ua - tolerance_ua : 0) - leak * plan_->part_ua) / unit_ua;
     const std::int64_t more_us = (static_cast<std::int64_t>(rate) * step_us) >> 14;
     excess_us = static_cast<std::int32_t>(
         std::clamp<std::int64_t>(excess_us + more_us, 0, std::numeric_limits<std::int32_t>::max()));

@@ -60,12 +60,13 @@ enum class Fault : std::uint8_t {
   crash,
   insulation_low,
   insulation_unknown,
+  front_end_hot,
 };
 
 /// One bit for each fault: bit k is Fault k.
 using FaultSet = std::uint64_t;
 
-inline constexpr std::size_t fault_count = 48;
+inline constexpr std::size_t fault_count = 49;
 static_assert(fault_count <= 62, "signal Faults.FirstCause has six bits and a value for not known");
 inline constexpr std::uint8_t no_fault = 0xFF;
 
@@ -116,7 +117,8 @@ inline constexpr std::array<const char*, fault_count> fault_names = {"cell overv
                                                                      "interlock open",
                                                                      "crash",
                                                                      "insulation low",
-                                                                     "insulation unknown"};
+                                                                     "insulation unknown",
+                                                                     "front end hot"};
 
 constexpr const char* name_of(Fault f) { return fault_names[static_cast<std::size_t>(f)]; }
 constexpr FaultSet bit(Fault f) { return FaultSet{1} << static_cast<unsigned>(f); }

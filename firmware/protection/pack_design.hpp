@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "model/cell_parameters.hpp"
+#include "model/pulse_ratings.hpp"
 
 namespace bms::protection {
 
@@ -45,6 +46,7 @@ struct PackDesign {
   /// Second current sensor: range, offset with its converter, and error of the gains of both sensors together (Hall
   /// sensor 2 %, front end and shunt without calibration 6 %).
   double second_current_range_a = 1'000, second_current_offset_a = 20, current_gain_error = 0.1;
+  model::PulseRatings pulses = {};  ///< of one cell, if its file states any
 };
 
 /// Rounded to 1e-6, saturated at +-2,147.48.

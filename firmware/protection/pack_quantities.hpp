@@ -1,8 +1,7 @@
 // Quantities that the table compares, computed from a sample. Readings are not repaired: an impossible reading counts
 // as missing.
 //
-//   overload I2t      h += ((I / limit)^2 - 1) dt, not below 0, with limit = 1.05 x continuous limit: a thermal replica
-//                     after IEC 60255-149, without its exponential. At rest 30 s of overload decay in 30 s.
+//   overload I2t      overload.hpp
 //   opposite shift    a broken sense wire floats between its neighbours: one cell reads low, the next equally high.
 //                     Counts if the two shifts differ by less than half of the smaller.
 //   stuck             a cell repeats its reading exactly for five samples or more while the other cells moved by 20 mV:
@@ -22,6 +21,7 @@
 
 #include "measurement/pack_sample.hpp"
 #include "protection/fault_monitor.hpp"
+#include "protection/overload.hpp"
 #include "protection/pack_design.hpp"
 
 namespace bms::protection {
@@ -32,14 +32,18 @@ struct PackLimits {
   std::int32_t common_range_ua;                      ///< that both current sensors can measure, at most 1,000 A
   std::int32_t gain_error_256ths;                    ///< of both current sensors together
   std::uint8_t temperatures;
+  OverloadPlan charge_overload, discharge_overload;
 };
 
 constexpr PackLimits pack_limits(const PackDesign& d) {
   const auto part = [](double a) { return std::max(in_micro(overcurrent_from * a) / 256, std::int32_t{1}); };
-  return {part(d.limits.charge_current_max_a), part(d.limits.discharge_current_max_a),
+  return {part(d.limits.charge_current_max_a),
+          part(d.limits.discharge_current_max_a),
           in_micro(std::min({d.current_range_a, d.second_current_range_a, 1'000.0})),
           static_cast<std::int32_t>(256 * d.current_gain_error + 0.5),
-          std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures)};
+          std::min<std::uint8_t>(d.temperatures, measurement::max_temperatures),
+          overload_plan(d.pulses.charge, d.limits.charge_current_max_a, d.pulses.temperature_min_c),
+          overload_plan(d.pulses.discharge, d.limits.discharge_current_max_a, d.pulses.temperature_min_c)};
 }
 
 /// Magnitude of the difference of two current readings, less the part that the error of their gains explains [uA]. May
@@ -73,15 +77,14 @@ class PackQuantities {
  public:
   static constexpr std::int32_t stuck_move_uv = 20'000, stuck_move_cdegc = 500;
   static constexpr std::uint8_t stuck_after = 5;
-  static constexpr std::int32_t max_overload_i2t_us = 2'000'000'000;
 
   constexpr explicit PackQuantities(const PackLimits& limits) : limits_(limits) {}
 
   /// Writes the quantities of the sample into q. step_us: time since the last sample.
   constexpr void update(const measurement::PackSample<Cells>& sample, std::uint32_t step_us, Quantities& q) {
     update_cells(sample, q);
-    update_current(sample.current_ua, step_us, q);
     update_temperatures(sample.temperature_cdegc, q);
+    update_current(sample.current_ua, step_us, q);
   }
 
   /// Sum of all cells of the last sample [uV], or measurement::no_reading.
@@ -159,22 +162,22 @@ class PackQuantities {
     at(q, Quantity::currents_missing) = known ? 0 : 1;
     at(q, Quantity::current_magnitude_ua) = known ? magnitude(current_ua) : measurement::no_reading;
     if (known) {
-      integrate_overload(charge_overload_i2t_us_, current_ua / limits_.charge_ua_256th, step_us);
-      integrate_overload(discharge_overload_i2t_us_, -current_ua / limits_.discharge_ua_256th, step_us);
+      const std::int32_t coldest_cdegc = at(q, Quantity::lowest_cdegc);  // unknown: less than any temperature
+      integrate(charge_overload_, limits_.charge_overload, current_ua / limits_.charge_ua_256th, coldest_cdegc,
+                step_us);
+      integrate(discharge_overload_, limits_.discharge_overload, -current_ua / limits_.discharge_ua_256th,
+                coldest_cdegc, step_us);
     }
-    at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_i2t_us_ : measurement::no_reading;
-    at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_i2t_us_ : measurement::no_reading;
+    at(q, Quantity::charge_overload_i2t_us) = known ? charge_overload_.value_us() : measurement::no_reading;
+    at(q, Quantity::discharge_overload_i2t_us) = known ? discharge_overload_.value_us() : measurement::no_reading;
   }
 
-  /// times_256: current / limit in 1/256, negative in the other direction. Above ten it counts as ten, which is a short
-  /// circuit anyway. A reading at the end of the sensor's range counts as this current.
-  static constexpr void integrate_overload(std::int32_t& overload_i2t_us, std::int32_t times_256,
-                                           std::uint32_t step_us) {
-    const std::int32_t clamped = std::clamp(times_256, std::int32_t{0}, std::int32_t{10 * 256});
-    const std::int64_t more_us =
-        (static_cast<std::int64_t>(clamped * clamped - 256 * 256) * static_cast<std::int64_t>(step_us)) >> 16;
-    overload_i2t_us =
-        static_cast<std::int32_t>(std::clamp<std::int64_t>(overload_i2t_us + more_us, 0, max_overload_i2t_us));
+  /// times_256: current / limit in 1/256, negative in the other direction. A reading at the end of the sensor's range
+  /// counts as this current.
+  static constexpr void integrate(OverloadIntegral& overload, const OverloadPlan& plan, std::int32_t times_256,
+                                  std::int32_t coldest_cdegc, std::uint32_t step_us) {
+    overload.update(plan, std::clamp(times_256, std::int32_t{0}, most_times_256), coldest_cdegc >= plan.from_cdegc,
+                    step_us);
   }
 
   constexpr void update_temperatures(const std::array<std::int16_t, measurement::max_temperatures>& all,
@@ -207,7 +210,8 @@ class PackQuantities {
   PackLimits limits_;
   std::array<Repeats, Cells> cell_{};
   std::array<std::array<Repeats, 2>, measurement::max_temperatures> temperature_{};  ///< against the two middle ones
-  std::int32_t charge_overload_i2t_us_ = 0, discharge_overload_i2t_us_ = 0, sum_uv_ = measurement::no_reading;
+  OverloadIntegral charge_overload_, discharge_overload_;
+  std::int32_t sum_uv_ = measurement::no_reading;
 };
 
 }  // namespace bms::protection

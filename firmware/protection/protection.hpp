@@ -89,6 +89,7 @@ struct ExternalInputs {
   bool storage_fault = false;
   bool supply_dip = false;        ///< the supply of the controller has fallen, perhaps only for a moment
   std::uint32_t second_line = 0;  ///< trips of the front end: measurement::SecondLineTrip
+  std::int16_t front_end_cdegc = measurement::no_temperature;  ///< of its die, 0.01 degrees C
   bool second_current_fitted = false;
   std::int32_t second_current_ua = measurement::no_reading;
   // Of the truck; an input that is not fitted stays at its initial value.
@@ -262,6 +263,8 @@ class Protection {
   static constexpr void update_inputs(Quantities& q, const ExternalInputs& inputs, bool voltage_rejected) {
     at(q, Quantity::estimator_contradiction) = voltage_rejected;
     at(q, Quantity::storage_failed) = inputs.storage_fault;
+    if (inputs.front_end_cdegc != measurement::no_temperature)
+      at(q, Quantity::front_end_cdegc) = inputs.front_end_cdegc;
     at(q, Quantity::second_currents_missing) =
         inputs.second_current_fitted && inputs.second_current_ua == measurement::no_reading;
     at(q, Quantity::loop_open) = inputs.interlock_open;

@@ -49,8 +49,9 @@ enum class Quantity : std::uint8_t {
   crashed,
   insulation_missing,  ///< a monitor is fitted and has no reading
   insulation_ohm,      ///< between battery and frame
+  front_end_cdegc,     ///< die of the measuring chip
 };
-inline constexpr std::size_t quantity_count = 39;
+inline constexpr std::size_t quantity_count = 40;
 
 enum class Sense : std::uint8_t { above, below };
 

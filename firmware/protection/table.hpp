@@ -20,6 +20,7 @@
 #include <cstdint>
 
 #include "protection/faults.hpp"
+#include "protection/overload.hpp"
 #include "protection/pack_design.hpp"
 #include "protection/rule.hpp"
 
@@ -126,13 +127,14 @@ constexpr Table protection_table(const PackDesign& d) {
            .reaction = forbid_discharge,
            .why = "as for a cell, by a second measurement"}),
       row({.fault = charge_overcurrent,
-           .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
-           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .raised = {.quantity = charge_overload_i2t_us, .sense = above, .threshold = full_overload_us, .delay_s = 0},
+           .released = {.threshold = full_overload_us / 2, .after_s = 30, .recovery = automatic},
            .reaction = forbid_charge,
            .why = "the integral is the delay: 11 s at twice the limit, 29 s at 1.5 times the limit"}),
       row({.fault = discharge_overcurrent,
-           .raised = {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = 30'000'000, .delay_s = 0},
-           .released = {.threshold = 15'000'000, .after_s = 30, .recovery = automatic},
+           .raised =
+               {.quantity = discharge_overload_i2t_us, .sense = above, .threshold = full_overload_us, .delay_s = 0},
+           .released = {.threshold = full_overload_us / 2, .after_s = 30, .recovery = automatic},
            .reaction = forbid_discharge,
            .why = "as for the charge current"}),
       row({.fault = short_circuit,
@@ -305,8 +307,9 @@ constexpr Table protection_table(const PackDesign& d) {
            .raised = {.quantity = largest_excess_us, .sense = above, .threshold = in_micro(10.8), .delay_s = 0},
            .released = {.threshold = in_micro(10.2), .after_s = 10, .recovery = automatic},
            .reaction = open_now,
-           .why = "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
-                  "released after two minutes, as the next charge above the allowed current opens again at once"}),
+           .why =
+               "the integral is the delay: 0.3 % of the capacity, of which 0.2 % after the allowed current was 0; "
+               "released after two minutes at most, as the next charge above the allowed current opens again at once"}),
       row({.fault = supply_dip,
            .raised = {.quantity = supply_dips, .sense = above, .threshold = 0, .delay_s = 0},
            .released = {.threshold = 0, .after_s = 1, .recovery = automatic},
@@ -342,6 +345,11 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = 0, .after_s = 10, .recovery = automatic},
            .reaction = warn,
            .why = "a monitor needs up to 20 s for its first value"}),
+      row({.fault = front_end_hot,
+           .raised = {.quantity = Quantity::front_end_cdegc, .sense = above, .threshold = in_centi(95), .delay_s = 2},
+           .released = {.threshold = in_centi(85), .after_s = 60, .recovery = automatic},
+           .reaction = open,
+           .why = "a die warms up in minutes; at 110 °C the measuring chip shuts down and opens main plus under load"}),
   }};
 }
 

@@ -73,11 +73,12 @@ constexpr QuantityText text_of_event(Quantity q) {
     case Quantity::exceeds_allowed:
       return {"current above 1.1 times the allowed current plus the rest current"};
     case Quantity::charge_excess_us:
-      return {"charge above the allowed charge current, as time of 1C,", "s", 1e6, 1};
+      return {"charge above the allowed charge current, as time of 1C or of a lower limit,", "s", 1e6, 1};
     case Quantity::discharge_excess_us:
-      return {"charge above the allowed discharge current, as time of 1C,", "s", 1e6, 1};
+      return {"charge above the allowed discharge current, as time of 1C or of a lower limit,", "s", 1e6, 1};
     case Quantity::largest_excess_us:
-      return {"charge above the allowed current in the worse direction, as time of 1C,", "s", 1e6, 1};
+      return {"charge above the allowed current in the worse direction, as time of 1C or of a lower limit,", "s", 1e6,
+              1};
     case Quantity::supply_dips:
       return {"supply of the controller has fallen below the detector's threshold"};
     case Quantity::temperatures_shorted:
@@ -114,6 +115,8 @@ constexpr QuantityText text_of(Quantity q) {
       return {"warmest sensor", "°C", 1e2, 0};
     case Quantity::lowest_cdegc:
       return {"coldest sensor", "°C", 1e2, 0};
+    case Quantity::front_end_cdegc:
+      return {"die of the measuring chip", "°C", 1e2, 0};
     case Quantity::opposite_shift_uv:
       return {"opposite shift of neighbours", "V", 1e6, 3};
     case Quantity::spread_uv:

@@ -31,10 +31,15 @@ std::int32_t cell_uv(std::int16_t mv) {
   return mv == std::numeric_limits<std::int16_t>::min() ? measurement::no_reading : mv * 1'000;
 }
 
-std::int16_t cdegc(std::int16_t tenth_k) {
+/// Of any reading, possible or not.
+std::int16_t cdegc_of(std::int16_t tenth_k) {
   const int value = tenth_k * 10 - 27'315;
-  const auto narrow = static_cast<std::int16_t>(
+  return static_cast<std::int16_t>(
       std::clamp<int>(value, std::numeric_limits<std::int16_t>::min(), std::numeric_limits<std::int16_t>::max()));
+}
+
+std::int16_t cdegc(std::int16_t tenth_k) {
+  const std::int16_t narrow = cdegc_of(tenth_k);
   if (measurement::temperature_possible(narrow)) return narrow;
   return narrow > 0 ? measurement::shorted_thermistor : measurement::no_temperature;
 }
@@ -46,6 +51,7 @@ void FrontEnd::read(measurement::PackSample<cell_inputs>& into) {
   into = {};
   into.time_us = time_us;
   dc_link_uv_ = measurement::no_reading;
+  die_cdegc_ = measurement::no_temperature;
   trips_ = 0;
   interrupted_ = interrupted_ || silent();
   const bool measuring = state_ == State::measure;
@@ -267,8 +273,7 @@ bool FrontEnd::read_words(std::uint8_t command, std::span<std::uint8_t> into, st
 bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   // The alarm bits come first, so the values read after them are at least as fresh as they state.
   std::array<std::uint8_t, hdq_temperature + 2 - alarm_status> alarm_and_temperatures;
-  if (!read_words(alarm_status, alarm_and_temperatures, temperatures_, cfetoff_temperature - alarm_status))
-    return false;
+  if (!read_words(alarm_status, alarm_and_temperatures, temperatures_, die_temperature - alarm_status)) return false;
   // Trips stay until read_second_line() has seen them, also if a transfer before it fails.
   alarm_ = static_cast<std::uint16_t>((alarm_ & (tripped_a | tripped_bc)) |
                                       get_bytes<std::uint16_t>(alarm_and_temperatures, 0));
@@ -292,6 +297,8 @@ bool FrontEnd::read_scan(measurement::PackSample<cell_inputs>& into) {
   if (scan_age_ >= max_scan_age) return true;
   into.pack_uv = get_bytes<std::int16_t>(voltages, stack_voltage - first_cell) * voltage_step_uv;
   dc_link_uv_ = get_bytes<std::int16_t>(voltages, ld_voltage - first_cell) * voltage_step_uv;
+  const std::int16_t die = cdegc_of(get_bytes<std::int16_t>(alarm_and_temperatures, die_temperature - alarm_status));
+  if (measurement::temperature_possible(die)) die_cdegc_ = die;
   constexpr std::array<std::uint8_t, measurement::max_temperatures> sensors{ts1_temperature, ts3_temperature,
                                                                             hdq_temperature, cfetoff_temperature};
   for (std::size_t k = 0; k < sensors.size(); ++k)

@@ -89,6 +89,8 @@ class FrontEnd {
 
   /// DC link of the last read() [uV], or no_reading.
   std::int32_t dc_link_uv() const { return dc_link_uv_; }
+  /// Temperature of the chip's die in the last read() [0.01 degrees C], or no_temperature; measured with the DC link.
+  std::int16_t die_cdegc() const { return die_cdegc_; }
   /// PACK pin of the last read() against VSS [uV], or no_reading; measured with the DC link.
   std::int32_t strap_uv() const {
     if (dc_link_uv_ == measurement::no_reading) return measurement::no_reading;
@@ -133,6 +135,7 @@ class FrontEnd {
   std::size_t next_setting_ = 0;
   std::uint8_t waited_ = 0, failures_ = 0;
   bool swapped_ = false, fresh_ = false;
+  std::int16_t die_cdegc_ = measurement::no_temperature;
   std::int32_t dc_link_uv_ = 0;
   std::uint8_t scan_age_ = 0;  ///< samples since all inputs were measured
   std::uint32_t charge_time_s_ = 0;

@@ -13,8 +13,8 @@ inline constexpr std::uint16_t device_number = 0x7695;  // [12.2]
 inline constexpr std::uint8_t control_status = 0x00, safety_status_a = 0x03, battery_status = 0x12, first_cell = 0x14,
                               stack_voltage = 0x34, pack_voltage = 0x36, ld_voltage = 0x38, subcommand_low = 0x3E,
                               transfer_buffer = 0x40, buffer_checksum = 0x60, alarm_status = 0x62,
-                              alarm_raw_status = 0x64, cfetoff_temperature = 0x6A, ts1_temperature = 0x70,
-                              ts3_temperature = 0x74, hdq_temperature = 0x76, fet_status = 0x7F;
+                              alarm_raw_status = 0x64, die_temperature = 0x68, cfetoff_temperature = 0x6A,
+                              ts1_temperature = 0x70, ts3_temperature = 0x74, hdq_temperature = 0x76, fet_status = 0x7F;
 
 inline constexpr std::uint16_t in_deep_sleep = 1U << 2;  // of control_status
 

@@ -52,7 +52,7 @@ class OneChip {
     using State = FrontEnd::State;
     const State state = chip_.state();
     FrontEndHealth health{FrontEndState::configuring, chip_.counters().lost, chip_.counters().resets,
-                          chip_.wire().bad_crc};
+                          chip_.wire().bad_crc, chip_.die_cdegc()};
     if (state == State::absent) health.state = FrontEndState::absent;
     if (state == State::measure) health.state = FrontEndState::measuring;
     return health;

@@ -127,6 +127,7 @@ FrontEndHealth Stack::health() const {
     health.lost += half.chip.counters().lost;
     health.resets += half.chip.counters().resets;
     health.bad_crc += half.chip.wire().bad_crc;
+    health.die_cdegc = std::max(health.die_cdegc, half.chip.die_cdegc());  // no_temperature is less than any
   }
   return health;
 }

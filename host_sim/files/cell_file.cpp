@@ -158,6 +158,7 @@ std::string cell_text(const CellFile& file) {
                                  quoted(file.source));
   Writer writer(text, file.sources);
   visit_cell(writer, file.parameters);
+  visit_pulses(writer, file.pulses);
   for (const TemperatureTable& at : file.at_temperature) {
     text += "\n[[at_temperature]]\n";
     writer.number("temperature_c", at.temperature_c);
@@ -277,6 +278,21 @@ TemperatureTable read_temperature_table(TomlTable& table, const CellFile& file) 
   return at;
 }
 
+/// 0 stands for a missing rating, so a file that states 0 would be read as one that rates nothing.
+void reject_pulses_that_rate_nothing(TomlTable& top, const CellFile& file) {
+  if (!top.has("pulses")) return;
+  TomlTable table = top.table("pulses");
+  for (const char* key : {"charge_10s_a", "charge_30s_a", "discharge_10s_a", "discharge_30s_a"}) {
+    if (table.has(key) && table.number(key) == 0)
+      throw BadInput(file.path, table.line(key),
+                     fmt::format("'pulses.{}' is 0, expected a current, or no such key", key));
+  }
+  if (!file.pulses.stated())
+    throw BadInput(
+        file.path, table.line(),
+        "'pulses' rates no current, expected charge_10s_a, charge_30s_a, discharge_10s_a or discharge_30s_a");
+}
+
 /// Each parameter of a mechanism is within its bounds here.
 void reject_impossible_ocv(const TomlTable& top, const CellFile& file) {
   const std::optional<model::ImpossibleOcv> bad = model::first_impossible_ocv(file.parameters, file.mechanisms);
@@ -303,6 +319,7 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   read_identity(top, file);
   Reader reader(top, file.sources);
   visit_cell(reader, file.parameters);
+  visit_pulses(reader, file.pulses);
   reader.finish();
   for (TomlTable& table : top.tables("at_temperature"))
     file.at_temperature.push_back(read_temperature_table(table, file));
@@ -314,7 +331,10 @@ CellFile parse_cell(const std::string& text, const std::string& path) {
   for (const char* kind : {"mechanism", "instrument"}) top.has(kind);  // known; read once the capacity is checked
   top.finish();
 
-  if (const model::CellFault fault = model::first_fault(file.parameters); fault.what != nullptr) {
+  reject_pulses_that_rate_nothing(top, file);
+  for (const model::CellFault& fault :
+       {model::first_fault(file.parameters), model::first_fault(file.pulses, file.parameters.limits)}) {
+    if (fault.what == nullptr) continue;
     throw BadInput(path, top.line(fault.key, fault.index),
                    std::string("'") + fault.key + "' is out of range, expected " + fault.what);
   }

@@ -10,6 +10,7 @@
 #include "healthy_data/healthy_data.hpp"
 #include "model/cell_parameters.hpp"
 #include "model/extended.hpp"
+#include "model/pulse_ratings.hpp"
 
 namespace bms::files {
 
@@ -28,6 +29,7 @@ struct CellFile {
   std::string text;                            ///< the file itself
   std::uint32_t hash = 0;                      ///< first 32 bits of the SHA-256 of the text: identifies the file on CAN
   model::CellParameters<> parameters;
+  model::PulseRatings pulses;                    ///< of the maker, optional
   std::vector<TemperatureTable> at_temperature;  ///< ascending by temperature; empty: unknown
   std::vector<model::MechanismSetting>
       mechanisms;                     ///< effects that the 1RC model does not contain; ascending index, each once

@@ -91,6 +91,20 @@ inline constexpr model::ExtendedCell<S, model::interval_count(parameters), Laws<
                      fmt::arg("values", values));
 }
 
+/// For the protections of a firmware; a header for the library has no use for them.
+std::string pulse_ratings(const model::PulseRatings& p) {
+  const auto rating = [](const model::PulseRating& r) {
+    return fmt::format("{{.for_10s_a = {}, .for_30s_a = {}}}", literal(r.for_10s_a), literal(r.for_30s_a));
+  };
+  return fmt::format(R"(
+inline constexpr model::PulseRatings pulses{{
+    .temperature_min_c = {}, .charge = {}, .discharge = {}}};
+
+static_assert(model::first_fault(pulses, parameters.limits).what == nullptr, "a pulse rating is out of range");
+)",
+                     literal(p.temperature_min_c), rating(p.charge), rating(p.discharge));
+}
+
 std::string initialiser(const CellFile& file) {
   Initialiser values;
   visit_cell(values, file.parameters);
@@ -100,8 +114,9 @@ std::string initialiser(const CellFile& file) {
 /// The model, as a header of this project or as the one header that is named.
 std::string include_lines(const CellFile& file, const std::string& include) {
   if (!include.empty()) return "#include " + include;
-  return fmt::format("#include \"model/{}.hpp\"\n#include \"model/extended_rc.hpp\"",
-                     on_board(file.mechanisms).empty() ? "cell" : "extended");
+  return fmt::format(
+      "#include \"model/{}.hpp\"\n#include \"model/extended_rc.hpp\"\n#include \"model/pulse_ratings.hpp\"",
+      on_board(file.mechanisms).empty() ? "cell" : "extended");
 }
 
 }  // namespace
@@ -141,12 +156,13 @@ inline constexpr std::uint32_t cell_hash = 0x{hash:08x};  // first 32 bits of th
 inline constexpr model::CellParameters<double> parameters{{{values}}};
 
 static_assert(model::first_fault(parameters).what == nullptr, "a parameter of the cell file is out of range");
-
+{pulses}
 {extension}
 }}  // namespace bms::generated
 )",
       fmt::arg("include", include_lines(file, include)), fmt::arg("extension", extension(file)),
-      fmt::arg("name", file.name), fmt::arg("hash", file.hash), fmt::arg("values", initialiser(file)));
+      fmt::arg("pulses", include.empty() ? pulse_ratings(file.pulses) : ""), fmt::arg("name", file.name),
+      fmt::arg("hash", file.hash), fmt::arg("values", initialiser(file)));
 }
 
 }  // namespace bms::files

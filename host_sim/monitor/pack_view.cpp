@@ -117,6 +117,7 @@ PackView pack_view(const BusState& bus) {
   if (!v.voltage_v.known()) v.voltage_v = bus.reading("PackVoltage", "Voltage");  // more than 16 cells
   v.current_a = bus.reading("PackElectrical", "Current");
   v.temperature_c = bus.reading("PackElectrical", "Temperature");
+  v.front_end_c = bus.reading("FrontEnd", "DieTemperature");
   v.discharge_now_a = bus.reading("CurrentLimits", "DischargeNow");
   v.charge_now_a = bus.reading("CurrentLimits", "ChargeNow");
   v.discharge_10s_a = bus.reading("CurrentLimits", "DischargeTenSeconds");

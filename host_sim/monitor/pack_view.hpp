@@ -21,6 +21,7 @@ struct PackView {
   TextItem soc_quality;
   int soc_quality_value = -1;  ///< of the signal SocQuality; -1: invalid or not received
   Reading voltage_v, current_a, temperature_c;
+  Reading front_end_c;  ///< die of the measuring chip
   Reading discharge_now_a, charge_now_a, discharge_10s_a, charge_10s_a;
   Reading capacity_percent, capacity_sigma_percent, resistance_percent, resistance_sigma_percent;
   std::vector<Reading> cells_v;         ///< CellVoltages*.Cell1, Cell2, ... up to the highest that was received

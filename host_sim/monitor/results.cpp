@@ -35,6 +35,7 @@ Json pack_json(const BusState& bus) {
                {"voltage_v", number(p.voltage_v.value)},
                {"current_a", number(p.current_a.value)},
                {"temperature_c", number(p.temperature_c.value)},
+               {"front_end_c", number(p.front_end_c.value)},
                {"limits",
                 {{"discharge_now_a", number(p.discharge_now_a.value)},
                  {"charge_now_a", number(p.charge_now_a.value)},

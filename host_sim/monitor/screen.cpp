@@ -123,6 +123,9 @@ class Drawing {
         .add(columns_ >= columns_for_direction ? direction() : "", style_of(stale))
         .add("   ");
     line.add(number(pack_.temperature_c, 1, facts_.blocks ? " \u00b0C" : " degC"), style_of(stale, TextStyle::strong));
+    if (pack_.front_end_c.known() && columns_ >= columns_for_direction)
+      line.add("   front end " + number(pack_.front_end_c, 0, facts_.blocks ? " \u00b0C" : " degC"),
+               style_of(pack_.front_end_c.stale));
     return line;
   }
 

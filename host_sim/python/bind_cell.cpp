@@ -96,6 +96,7 @@ CellFile cell_of(const Tables& t, const CellFile& like) {
   cell.mechanisms.clear();
   cell.at_temperature.clear();
   cell.sources.clear();
+  cell.pulses = {};
   workflow::scale_to(t.capacity_ah, cell);
   cell.name = t.name;
   if (!t.chemistry.empty()) cell.chemistry = t.chemistry;

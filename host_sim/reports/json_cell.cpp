@@ -6,6 +6,7 @@ namespace bms::reports {
 
 std::string json_of(const files::CellFile& cell, const std::vector<std::string>& doubts) {
   const model::CellParameters<>& p = cell.parameters;
+  const auto rated = [](double a) { return a != 0 ? Json(a) : Json(nullptr); };
   Json nodes = Json::array();
   for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
     nodes.push_back(
@@ -20,6 +21,12 @@ std::string json_of(const files::CellFile& cell, const std::vector<std::string>&
                     {"voltage_max_v", p.limits.voltage_max_v},
                     {"charge_current_max_a", p.limits.charge_current_max_a},
                     {"discharge_current_max_a", p.limits.discharge_current_max_a}}},
+                  {"pulses",
+                   {{"temperature_min_c", cell.pulses.stated() ? Json(cell.pulses.temperature_min_c) : Json(nullptr)},
+                    {"charge_10s_a", rated(cell.pulses.charge.for_10s_a)},
+                    {"charge_30s_a", rated(cell.pulses.charge.for_30s_a)},
+                    {"discharge_10s_a", rated(cell.pulses.discharge.for_10s_a)},
+                    {"discharge_30s_a", rated(cell.pulses.discharge.for_30s_a)}}},
                   {"rc", nodes},
                   {"doubts", doubts}});
 }

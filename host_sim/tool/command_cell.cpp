@@ -82,6 +82,19 @@ std::string capacity_text(const files::CellFile& cell) {
   return "";
 }
 
+/// One line, or nothing if the file states none.
+std::string pulses_text(const model::PulseRatings& p) {
+  std::string text;
+  const auto add = [&](double a, const char* what) {
+    if (a != 0) text += fmt::format("{}{:g} A {}", text.empty() ? "" : ", ", a, what);
+  };
+  add(p.charge.for_10s_a, "charging for 10 s");
+  add(p.charge.for_30s_a, "charging for 30 s");
+  add(p.discharge.for_10s_a, "discharging for 10 s");
+  add(p.discharge.for_30s_a, "discharging for 30 s");
+  return text.empty() ? "" : fmt::format("  pulses  {}, from {:g} degrees C on\n", text, p.temperature_min_c);
+}
+
 std::string shown(const files::CellFile& cell) {
   const model::CellParameters<>& p = cell.parameters;
   std::string text = fmt::format("{}: {}, {:.5g} Ah{} at {:g} degrees C. {}\n", cell.name, cell.chemistry,
@@ -90,6 +103,7 @@ std::string shown(const files::CellFile& cell) {
   text += fmt::format("  limits  {:g} to {:g} V, {:g} A charging, {:g} A discharging, {:g} to {:g} degrees C\n",
                       l.voltage_min_v, l.voltage_max_v, l.charge_current_max_a, l.discharge_current_max_a,
                       l.temperature_min_c, l.temperature_max_c);
+  text += pulses_text(cell.pulses);
   text += fmt::format("  OCV     {:.3f} V empty, {:.3f} V full, {} straight pieces{}\n", ocv_at(p.ocv, 0),
                       ocv_at(p.ocv, p.ocv.soc.size - 1), p.ocv.b0_v.size,
                       p.ocv.half_gap_v.size > 0 ? ", with the gap between charge and discharge" : "");

@@ -56,12 +56,19 @@ std::string names(const std::vector<model::MechanismSetting>& mechanisms) {
   return text.empty() ? "none" : text;
 }
 
-/// Limits and capacity: what the firmware protects by.
+/// Limits, capacity and pulse ratings: what the firmware protects by.
 class ProtectedBy {
  public:
   std::vector<std::pair<std::string, double>> values;
 
-  explicit ProtectedBy(const model::CellParameters<>& p) { model::visit_cell(*this, p); }
+  explicit ProtectedBy(const files::CellFile& file) {
+    model::visit_cell(*this, file.parameters);
+    values.emplace_back("pulses.temperature_min_c", file.pulses.temperature_min_c);
+    for (const auto& [name, rating] : {std::pair("charge", file.pulses.charge), {"discharge", file.pulses.discharge}}) {
+      values.emplace_back(fmt::format("pulses.{}_10s_a", name), rating.for_10s_a);
+      values.emplace_back(fmt::format("pulses.{}_30s_a", name), rating.for_30s_a);
+    }
+  }
 
   void table(const char* key) { table_ = key; }
   bool optional_table(const char* key, bool known) {
@@ -90,7 +97,7 @@ void refuse_other_model(const files::CellFile& cell, const files::CellFile& buil
                               ", expected a cell file that differs from it in its tables only; this one needs new "
                               "firmware (bms image sign)");
   };
-  const ProtectedBy now(cell.parameters), before(built.parameters);
+  const ProtectedBy now(cell), before(built);
   for (std::size_t k = 0; k < now.values.size(); ++k) {
     if (now.values[k].second != before.values[k].second)
       refuse(fmt::format("{} is {}, of the firmware's cell file {}, and the firmware protects by it",

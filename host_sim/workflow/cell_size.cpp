@@ -72,6 +72,10 @@ std::vector<std::string> scale_to(double capacity_ah, files::CellFile& cell) {
   for (double* a : {&p.limits.charge_current_max_a, &p.limits.discharge_current_max_a}) {
     *a = std::clamp(*a * times, model::accepted::current_a.low, model::accepted::current_a.high);
   }
+  for (double* a : {&cell.pulses.charge.for_10s_a, &cell.pulses.charge.for_30s_a, &cell.pulses.discharge.for_10s_a,
+                    &cell.pulses.discharge.for_30s_a}) {
+    if (*a != 0) *a = std::clamp(*a * times, model::accepted::current_a.low, model::accepted::current_a.high);
+  }
   for (double* a :
        {&p.noise.current_a, &p.noise.current_offset_a, &p.noise.current_unknown_a, &p.noise.current_at_rest_a}) {
     *a *= times;

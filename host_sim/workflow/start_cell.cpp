@@ -93,6 +93,8 @@ StartCell read_start(const IdentifyOptions& options) {
   StartCell start;
   start.cell = options.start_cell ? *options.start_cell : files::read_cell(options.start);
   start.capacity_ah = start.cell.parameters.capacity_ah;
+  start.cell.pulses = {};  // its maker states them for that cell, and recordings do not show them
+  start.cell.sources.erase("pulses");
   model::CellParameters<>& p = start.cell.parameters;
   p.reference_temperature_c = options.reference_temperature_c.value_or(p.reference_temperature_c);
   if (!options.ocv.empty()) {

@@ -36,7 +36,8 @@ struct Chip {
   constexpr bool wider_and_slower() const {
     return overvoltage_is_wider_and_slower(line, rules, period_s) &&
            undervoltage_is_wider_and_slower(line, rules, period_s) &&
-           overcurrent_is_wider_and_slower(line, rules, pack) && sustained_is_wider_and_slower(line, rules, pack) &&
+           overcurrent_is_wider_and_slower(line, rules, pack) &&
+           charge_overcurrent_is_above_rated_pulses(line, rules, pack) && sustained_is_wider_and_slower(line, pack) &&
            temperatures_are_wider_and_slower(line, rules) && line.all_on && host_silence_is_slower(line, rules) &&
            current_is_in_range(board, rules) && hal::bq76952::possible(board);
   }
@@ -210,11 +211,57 @@ TEST(SecondLineOfTheFrontEnd, APackForWhichAProtectionWouldBeTooNarrowOrOffDoesN
   hal::bq76952::Board board = table9.board;
   board.sustained_delay_s = 10;
   const auto fast = hal::bq76952::settings(board);
-  EXPECT_FALSE(sustained_is_wider_and_slower(second_line(fast, 0.1), table9.rules, table9.pack));
+  EXPECT_FALSE(sustained_is_wider_and_slower(second_line(fast, 0.1), table9.pack));
   board = table9.board;
   board.charge_hot_c = 46;
   const auto narrow = hal::bq76952::settings(board);
   EXPECT_FALSE(temperatures_are_wider_and_slower(second_line(narrow, 0.1), table9.rules));
+}
+
+/// Whatever a cell file rates, the chip's threshold stays, its delay is at most 36 s, and the image compiles.
+TEST(SecondLineOfTheFrontEnd, LeavesRatedPulsesToTheFirstLineWithTheSameThreshold) {
+  int waits = 0, cases = 0;
+  for (const double limit_a : {6.0, 70.3, 100.0, 206.1, 280.0, 400.0}) {
+    const Chip without(lfp(limit_a), limit_a);
+    for (double for_30s = 1; for_30s < 6; for_30s += 0.003) {
+      for (const double more : {1.0, 1.01, 3.0}) {
+        Chip chip = without;
+        chip.pack.pulses.discharge = {more * for_30s * limit_a, cases % 5 == 0 ? 0 : for_30s * limit_a};
+        if (chip.pack.pulses.discharge.for_10s_a > model::accepted::current_a.high) continue;
+        chip.board = front_end_board(chip.pack, chip.rules);
+        chip.settings = hal::bq76952::settings(chip.board);
+        chip.line = second_line(chip.settings, chip.board.shunt_mohm);
+        EXPECT_EQ(chip.line.sustained_a, without.line.sustained_a);
+        EXPECT_LE(chip.line.sustained_s, 36);
+        EXPECT_TRUE(chip.wider_and_slower()) << limit_a << " A, " << for_30s << " for 30 s, times " << more;
+        waits += chip.line.sustained_s > 20 ? 1 : 0;
+        ++cases;
+      }
+    }
+  }
+  EXPECT_GT(waits, cases / 4);
+  Chip fast = table9;
+  fast.pack.pulses.discharge = {18, 12};
+  EXPECT_FALSE(fast.wider_and_slower()) << "12 A for 20 s, and the first line allows 30 s";
+}
+
+/// At 0.1 mOhm its comparator ends at 1,240 A: 4.4 times 280 A, but 3.1 times 400 A.
+TEST(SecondLineOfTheFrontEnd, AChargePulseIsRatedBelowTheChipsOvercurrentOrTheImageDoesNotCompile) {
+  const auto fits = [](double limit_a, model::PulseRating charge) {
+    Chip chip(lfp(limit_a), limit_a);
+    chip.pack.pulses.charge = charge;
+    EXPECT_TRUE(overcurrent_is_wider_and_slower(chip.line, chip.rules, chip.pack)) << "the shunt is not the reason";
+    EXPECT_EQ(charge_overcurrent_is_above_rated_pulses(chip.line, chip.rules, chip.pack), chip.wider_and_slower());
+    return chip.wider_and_slower();
+  };
+  EXPECT_TRUE(fits(400, {0, 0}));
+  EXPECT_TRUE(fits(400, {1'180, 800}));
+  EXPECT_FALSE(fits(400, {1'182, 800})) << "1,241 A with the error of the sensor";
+  EXPECT_FALSE(fits(400, {0, 1'400}));
+  EXPECT_TRUE(fits(280, {1'180, 0}));
+  EXPECT_FALSE(fits(280, {1'300, 0}));
+  EXPECT_TRUE(fits(100, {480, 300}));
+  EXPECT_TRUE(fits(100, {1'000, 300})) << "above short circuit the first line opens, too";
 }
 
 /// What is off stands in the safety file by its name.

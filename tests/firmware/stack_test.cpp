@@ -123,6 +123,7 @@ class StackBench {
     external.link_plus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.plus_v));
     external.link_minus_uv = static_cast<std::int32_t>(std::lround(1e6 * poles.minus_v));
     external.second_line = stack.trips();
+    external.front_end_cdegc = stack.health().die_cdegc;
     for (std::size_t k = 0; k < board.cell_v.size(); ++k)  // a reading that never changes is a fault of its own
       board.cell_v[k] = 3.28 + 0.001 * static_cast<double>(k) + 0.0005 * static_cast<double>((count_ + k) % 3);
     for (std::size_t k = 0; k < 4; ++k) board.temperature_c[k] = 25 + 0.1 * static_cast<double>((count_ + k) % 5);
@@ -155,6 +156,23 @@ TEST(Stack, ReadsThirteenAndTwelveCellsAsTwentyFiveInOrder) {
   EXPECT_NEAR(bench.sample.cell_uv[13], 3'293'500, 1'000);
   EXPECT_EQ(bench.stack.health().state, FrontEndState::measuring);
   for (const Bq76952Model& chip : bench.board.chip) EXPECT_THAT(chip.violations, ::testing::IsEmpty());
+}
+
+TEST(Stack, TheWarmerDieOpensBeforeItsChipShutsDown) {
+  for (const std::size_t hot : {lower, upper}) {
+    StackBench bench;
+    bench.drive_off();
+    double opened_c = 0;
+    for (bench.board.die_c[hot] = 80; bench.board.die_c[hot] < 109; bench.board.die_c[hot] += 0.2) {  // 2 K/s
+      bench.next();
+      if (opened_c == 0 && !bench.decision().outputs.any_closed()) opened_c = bench.board.die_c[hot];
+    }
+    EXPECT_GT(opened_c, 95);
+    EXPECT_LT(opened_c, 110);
+    EXPECT_TRUE(bench.has(Fault::front_end_hot));
+    EXPECT_EQ(bench.decision().first.fault, static_cast<std::uint8_t>(Fault::front_end_hot));
+    EXPECT_TRUE(bench.board.enables_contactors()) << "the chips have not opened";
+  }
 }
 
 TEST(Stack, TenMinutesOfDrivingHaveNoFaultAndNoMissingReading) {

@@ -1,5 +1,6 @@
 // The inputs and outputs of a truck, with the real application on this machine: what each does, that no coil supply is
 // a state, and that an input that is not fitted does nothing.
+#include <cmath>
 #include <string>
 
 #include <gtest/gtest.h>
@@ -247,6 +248,35 @@ TEST(Thermistor, ThatIsShortedStopsInAnOrderlyWayBeforeTheFrontEndOpensUnderLoad
   broken.first_cdegc = measurement::no_temperature;
   broken.run(60);
   EXPECT_TRUE(broken.drives()) << "a broken one reads as cold, and the front end stops no discharge for it";
+}
+
+TEST(FrontEndDie, ThatIsHotStopsInAnOrderlyWayAndTheTruckDrivesAgainWhenItHasCooled) {
+  TruckDay t(true, std::nullopt, all_inputs);
+  ASSERT_TRUE(t.key_on());
+  t.load_a = 100;
+  host_hal::front_end.die_cdegc = 9'500;
+  t.run(20);
+  EXPECT_TRUE(t.drives());
+  EXPECT_NEAR(last<can::FrontEnd>()->die_temperature, 95, 1.01);
+  EXPECT_EQ(t.faults(), 0U);
+  host_hal::front_end.die_cdegc = 9'510;
+  t.run(2.2);
+  EXPECT_EQ(t.last_stored(), "front end hot");
+  EXPECT_TRUE(t.any_closed()) << "5 s of grace";
+  EXPECT_EQ(last<can::AllowedCurrent>()->discharge, 0);
+  EXPECT_EQ(last<can::MoreFaults>()->front_end_hot, 1U);
+  EXPECT_EQ(last<can::Faults>()->first_cause, can::Faults::first_cause_front_end_hot);
+  t.load_a = 0;
+  t.run(1);
+  EXPECT_FALSE(t.any_closed());
+  host_hal::front_end.die_cdegc = 8'400;
+  t.run(61);
+  EXPECT_TRUE(t.next_key_on_drives());
+  host_hal::front_end.die_cdegc = measurement::no_temperature;
+  t.run(1);
+  EXPECT_TRUE(t.drives()) << "the readings of the pack say whether the chip measures";
+  EXPECT_EQ(t.faults(), 0U);
+  EXPECT_TRUE(std::isnan(last<can::FrontEnd>()->die_temperature));
 }
 
 TEST(SecondCurrentSensor, ThatIsFittedAndGivesNoReadingIsAFault) {

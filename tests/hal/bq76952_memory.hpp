@@ -30,6 +30,9 @@ constexpr Setting power_config{0x9234, 2, 0x2982};
 constexpr Setting reg12_config{0x9236, 1, 0};
 constexpr Setting reg0_config{0x9237, 1, 0};
 constexpr Setting comm_type{0x9239, 1, 0};
+// SLUUBY1B, Power:Shutdown: degrees C of the die, s
+constexpr Setting shutdown_temperature{0x9244, 1, 85};
+constexpr Setting shutdown_temperature_delay{0x9245, 1, 5};
 constexpr std::uint16_t first_pin_config = 0x92FA;  ///< CFETOFF; then DFETOFF, ALERT, TS1, TS2, TS3, HDQ, DCHG, DDSG
 constexpr Setting alert_pin{0x92FC, 1, 0};
 constexpr Setting ts1_pin{0x92FD, 1, 0x07};
@@ -120,6 +123,8 @@ constexpr std::array all_settings{cc_gain,
                                   reg12_config,
                                   reg0_config,
                                   comm_type,
+                                  shutdown_temperature,
+                                  shutdown_temperature_delay,
                                   alert_pin,
                                   ts1_pin,
                                   dchg_pin,

@@ -41,6 +41,7 @@ void Bq76952Model::reset() {
   low_ = high_ = 0;
   outputs_high_ = 0;
   quarters_seen_ = 0;
+  hot_s_ = 0;
   start_firmware();
 }
 
@@ -63,6 +64,7 @@ Bq76952Inputs Bq76952Model::simple_circuit() {
   in.cell_v = cell_v;
   in.stack_v = in.pack_v = stack_v;
   in.ld_v = ld_v;
+  in.internal_c = die_c;
   in.ts2_low = time_us >= ts2_low_from_us && time_us < ts2_low_until_us;
   in.shunt_v = current_a * shunt_mohm * 1e-3;
   for (std::size_t k = 0; k < simple_thermistors.size(); ++k) {
@@ -102,6 +104,10 @@ void Bq76952Model::step(std::uint64_t us) {
   const double s = 1e-6 * static_cast<double>(us);
   time_us += us;
   charge_as += in_.shunt_v / (1e-3 * shunt_mohm) * s;
+  const bool hot =
+      runs() && measurement_.internal_dk() >= 2'731.5 + 10 * memory_.signed_value(bq::shutdown_temperature);
+  hot_s_ = hot ? hot_s_ + s : 0;
+  if (hot_s_ > memory_[bq::shutdown_temperature_delay]) ending_ = true;
   if (ending_ && !in_.ts2_low && in_.ld_v < ld_high_v) {
     ending_ = false;
     shutdown_ = true;

@@ -37,6 +37,7 @@ class Bq76952Model {
   double stack_v = 0, ld_v = 0, current_a = 0, shunt_mohm = 0.1;
   std::uint64_t ts2_low_from_us = 0, ts2_low_until_us = 0;
   std::array<double, 4> temperature_c{25, 25, 25, 25};  ///< of thermistors 103AT at TS1, TS3, HDQ, CFETOFF
+  double die_c = 25;
 
   double charge_as = 0;  ///< true charge
   std::uint64_t time_us = 0;
@@ -140,6 +141,7 @@ class Bq76952Model {
   bool checked_ = false, config_ = false, was_reset_ = true, stuck_ = false, shutdown_ = false, ending_ = false,
        own_circuit_ = false, fet_en_ = false, pf_en_ = false;
   unsigned quarters_seen_ = 0;
+  double hot_s_ = 0;  ///< time of the die above Shutdown Temperature
 };
 
 }  // namespace bms

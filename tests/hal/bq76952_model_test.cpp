@@ -454,6 +454,19 @@ TEST_F(ChipModel, OutputsFloatInShutdownAndTheSettingsAreLost) {
   EXPECT_EQ(chip_.memory(0x9302, 1), 0U);
 }
 
+TEST_F(ChipModel, AHotDieShutsDownAfterItsDelay) {
+  configure_outputs({{bq::shutdown_temperature, 110}});
+  in.internal_c = 109;
+  wait_s(20);
+  EXPECT_TRUE(chip_.enables_contactors());
+  in.internal_c = 111;
+  wait_s(4.8);
+  EXPECT_TRUE(chip_.enables_contactors());
+  wait_s(0.5);
+  EXPECT_FALSE(chip_.enables_contactors());
+  EXPECT_TRUE(chip_.in_shutdown() || chip_.in_soft_shutdown());
+}
+
 TEST_F(ChipModel, ShutdownWaitsForTs2AndLdWithItsOutputsOff) {
   const std::array<void (*)(Bq76952Inputs&), 2> causes{[](Bq76952Inputs& i) { i.ts2_low = true; },
                                                        [](Bq76952Inputs& i) { i.ld_v = 20; }};

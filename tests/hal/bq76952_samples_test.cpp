@@ -101,6 +101,7 @@ TEST_F(Bq76952SecondLine, ACalibrationChangesTheReadings) {
 TEST_F(Bq76952SecondLine, TripsHealthAndClearAreThoseOfTheChip) {
   EXPECT_EQ(hal::second_line_trips(), 0U);
   EXPECT_EQ(hal::front_end_health().state, hal::FrontEndState::measuring);
+  EXPECT_NEAR(hal::front_end_health().die_cdegc, 2'500, 6);
   model.current_a = -700;
   model.advance(1'000);
   model.current_a = 0;
@@ -115,6 +116,7 @@ TEST_F(Bq76952SecondLine, TripsHealthAndClearAreThoseOfTheChip) {
   model.gone = true;
   for (int k = 0; k < 3; ++k) hal::next_sample();
   EXPECT_EQ(hal::front_end_health().state, hal::FrontEndState::absent);
+  EXPECT_EQ(hal::front_end_health().die_cdegc, measurement::no_temperature);
   EXPECT_EQ(hal::front_end_health().lost, health.lost + 1);
 }
 

@@ -128,6 +128,33 @@ TEST_F(Bq76952, AnOpenTemperatureSensorGivesNoTemperatureAndAShortedOneItsOwnRea
   EXPECT_EQ(sample.temperature_cdegc[2], measurement::shorted_thermistor);
 }
 
+TEST_F(Bq76952, TheTemperatureOfTheDieIsReadWithTheOthersAndMissingOutsideOfItsRange) {
+  start();
+  const unsigned before = model.transfers;
+  next();
+  const unsigned of_a_sample = model.transfers - before;
+  for (const double celsius : {-40.0, -0.3, 25.0, 84.9, 95.1, 109.0}) {
+    model.die_c = celsius;
+    model.advance(200'000);
+    next(300'000);
+    EXPECT_NEAR(front_end.die_cdegc(), 100 * celsius, 6) << celsius;
+  }
+  for (const double celsius : {-273.15, -61.0, 151.0}) {
+    model.die_c = celsius;
+    model.advance(200'000);
+    next(300'000);
+    EXPECT_EQ(front_end.die_cdegc(), measurement::no_temperature) << celsius;
+  }
+  model.die_c = 25;
+  for (int k = 0; k < 5; ++k) next();
+  const unsigned then = model.transfers;
+  next();
+  EXPECT_EQ(model.transfers - then, of_a_sample) << "no transfer of its own";
+  model.only_cells = true;
+  for (int k = 0; k < 4; ++k) next();
+  EXPECT_EQ(front_end.die_cdegc(), measurement::no_temperature) << "an old value";
+}
+
 TEST_F(Bq76952, UpToThreeFaultsInARowAtAnyTransferLeaveCorrectReadingsOrNone) {
   start();
   double v = 3.0;
@@ -319,6 +346,7 @@ TEST_F(Bq76952, AfterARestartOfOnlyThisCoreAConfiguredChipIsNotConfiguredAgain) 
   start();
   const auto set_config = std::count(model.commands.begin(), model.commands.end(), 0x0090);
   FrontEnd again{configuration};
+  EXPECT_EQ(again.die_cdegc(), measurement::no_temperature) << "before the first sample";
   measurement::PackSample<16> first;
   int samples = 0;
   for (; samples < 10 && first.current_ua == measurement::no_reading; ++samples) {

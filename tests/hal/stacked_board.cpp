@@ -45,6 +45,7 @@ Bq76952Inputs StackedBoard::circuit(std::size_t which) const {
     in.stack_v += cell_v[first + k];
   }
   in.pack_v = (which == upper) == strapped[which] ? in.stack_v : 0;
+  in.internal_c = die_c[which];
   in.shunt_v = which == lower ? 1e-4 * current_a : 0;
   const auto set = [&](ThermistorPin pin, double celsius) {
     in.thermistor_ohm[static_cast<std::size_t>(pin)] = thermistor_ohm(celsius);

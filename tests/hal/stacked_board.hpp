@@ -28,6 +28,8 @@ class StackedBoard {
   double current_a = 0;
   std::array<double, 4> temperature_c{25, 26, 27, 28};  ///< two at the lower chip, two at the upper one
 
+  std::array<double, 2> die_c{25, 25};
+
   // faults; those of a chip itself are in chip[]
   bool isolator_supplied = true;             ///< false: its far side; wires high here, enable signals low
   bool swapped = false;                      ///< the two buses are exchanged at the controller

@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 0e6e94c606a73131e0f532a0f514b3d40d93bcfaa74219619d262b97d0dd09d7
+// SHA-256 of that file: 302534dbd9fbbd0451d715c74f9cda17968387bf4027244f0a9390f8f234230c
 #pragma once
 
 #include <array>
@@ -1354,7 +1354,7 @@ struct Faults {
   std::uint32_t internal_fault = 0;  ///< The firmware found an internal error, or the watchdog reset it.
   static constexpr SignalLayout storage_fault_layout = {47, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t storage_fault = 0;  ///< Records cannot be stored.
-  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 48.0F, true, 63};
+  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 49.0F, true, 63};
   std::uint32_t first_cause = 0;  ///< First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.
   static constexpr std::uint32_t first_cause_none = 0;
   static constexpr std::uint32_t first_cause_cell_overvoltage_warning = 1;
@@ -1405,6 +1405,7 @@ struct Faults {
   static constexpr std::uint32_t first_cause_crash = 46;
   static constexpr std::uint32_t first_cause_insulation_low = 47;
   static constexpr std::uint32_t first_cause_insulation_unknown = 48;
+  static constexpr std::uint32_t first_cause_front_end_hot = 49;
   static constexpr std::uint32_t first_cause_not_known = 63;
 
   constexpr can::Frame frame(std::uint8_t counter) const {
@@ -1554,7 +1555,7 @@ struct Faults {
     see("SamplesMissing", "No samples arrive.", std::span<const ValueName>());
     see("InternalFault", "The firmware found an internal error, or the watchdog reset it.", std::span<const ValueName>());
     see("StorageFault", "Records cannot be stored.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 50> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{43, "thermistor shorted"}, ValueName{44, "second current missing"}, ValueName{45, "interlock open"}, ValueName{46, "crash"}, ValueName{47, "insulation low"}, ValueName{48, "insulation unknown"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 51> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{43, "thermistor shorted"}, ValueName{44, "second current missing"}, ValueName{45, "interlock open"}, ValueName{46, "crash"}, ValueName{47, "insulation low"}, ValueName{48, "insulation unknown"}, ValueName{49, "front end hot"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
   }
 };
 
@@ -1596,6 +1597,8 @@ struct MoreFaults {
   std::uint32_t insulation_low = 0;  ///< The resistance between battery and frame is below 100 ohm per volt: charging is forbidden.
   static constexpr SignalLayout insulation_unknown_layout = {31, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t insulation_unknown = 0;  ///< The insulation monitor has given no value for a minute.
+  static constexpr SignalLayout front_end_hot_layout = {32, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t front_end_hot = 0;  ///< The die of the measuring chip is above 95 degC. At 110 degC the chip would shut down and open under load, so the firmware opens before.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
@@ -1615,6 +1618,7 @@ struct MoreFaults {
     put<crash_layout>(out, crash);
     put<insulation_low_layout>(out, insulation_low);
     put<insulation_unknown_layout>(out, insulation_unknown);
+    put<front_end_hot_layout>(out, front_end_hot);
     protect(out, data_id, counter);
     return out;
   }
@@ -1636,6 +1640,7 @@ struct MoreFaults {
     out.crash = get<crash_layout, decltype(out.crash)>(frame);
     out.insulation_low = get<insulation_low_layout, decltype(out.insulation_low)>(frame);
     out.insulation_unknown = get<insulation_unknown_layout, decltype(out.insulation_unknown)>(frame);
+    out.front_end_hot = get<front_end_hot_layout, decltype(out.front_end_hot)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -1657,6 +1662,7 @@ struct MoreFaults {
     see("Crash", "", crash, crash_layout);
     see("InsulationLow", "", insulation_low, insulation_low_layout);
     see("InsulationUnknown", "", insulation_unknown, insulation_unknown_layout);
+    see("FrontEndHot", "", front_end_hot, front_end_hot_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
@@ -1677,6 +1683,7 @@ struct MoreFaults {
     see("Crash", "The crash or tilt sensor has opened the contactors. Only a workshop clears it.", std::span<const ValueName>());
     see("InsulationLow", "The resistance between battery and frame is below 100 ohm per volt: charging is forbidden.", std::span<const ValueName>());
     see("InsulationUnknown", "The insulation monitor has given no value for a minute.", std::span<const ValueName>());
+    see("FrontEndHot", "The die of the measuring chip is above 95 degC. At 110 degC the chip would shut down and open under load, so the firmware opens before.", std::span<const ValueName>());
   }
 };
 
@@ -1970,6 +1977,8 @@ struct FrontEnd {
   std::uint32_t permanent_failure = 0;  ///< The chip reports a permanent failure.
   static constexpr SignalLayout pins_wrong_layout = {24, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t pins_wrong = 0;  ///< The enable signals do not follow the protections.
+  static constexpr SignalLayout die_temperature_layout = {25, 7, false, 2.0F, -62.0F, -60.0F, 192.0F, true, 0};
+  float die_temperature = unknown;  ///< [degC] Temperature of the measuring chip itself, of two chips that of the warmer one.
   static constexpr SignalLayout lost_layout = {32, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
   std::uint32_t lost = 0;  ///< Number of times that measuring ended since the start.
   static constexpr SignalLayout resets_layout = {40, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
@@ -1989,6 +1998,7 @@ struct FrontEnd {
     put<host_silence_layout>(out, host_silence);
     put<permanent_failure_layout>(out, permanent_failure);
     put<pins_wrong_layout>(out, pins_wrong);
+    put<die_temperature_layout>(out, die_temperature);
     put<lost_layout>(out, lost);
     put<resets_layout>(out, resets);
     put<crc_errors_layout>(out, crc_errors);
@@ -2007,6 +2017,7 @@ struct FrontEnd {
     out.host_silence = get<host_silence_layout, decltype(out.host_silence)>(frame);
     out.permanent_failure = get<permanent_failure_layout, decltype(out.permanent_failure)>(frame);
     out.pins_wrong = get<pins_wrong_layout, decltype(out.pins_wrong)>(frame);
+    out.die_temperature = get<die_temperature_layout, decltype(out.die_temperature)>(frame);
     out.lost = get<lost_layout, decltype(out.lost)>(frame);
     out.resets = get<resets_layout, decltype(out.resets)>(frame);
     out.crc_errors = get<crc_errors_layout, decltype(out.crc_errors)>(frame);
@@ -2025,6 +2036,7 @@ struct FrontEnd {
     see("HostSilence", "", host_silence, host_silence_layout);
     see("PermanentFailure", "", permanent_failure, permanent_failure_layout);
     see("PinsWrong", "", pins_wrong, pins_wrong_layout);
+    see("DieTemperature", "degC", die_temperature, die_temperature_layout);
     see("Lost", "", lost, lost_layout);
     see("Resets", "", resets, resets_layout);
     see("CrcErrors", "", crc_errors, crc_errors_layout);
@@ -2042,6 +2054,7 @@ struct FrontEnd {
     see("HostSilence", "The controller was silent, or the chip was reset or had no settings.", std::span<const ValueName>());
     see("PermanentFailure", "The chip reports a permanent failure.", std::span<const ValueName>());
     see("PinsWrong", "The enable signals do not follow the protections.", std::span<const ValueName>());
+    see("DieTemperature", "Temperature of the measuring chip itself, of two chips that of the warmer one.", std::span<const ValueName>());
     see("Lost", "Number of times that measuring ended since the start.", std::span<const ValueName>());
     see("Resets", "Number of resets of the chip while it measured.", std::span<const ValueName>());
     see("CrcErrors", "Number of transfers with a wrong check code.", std::span<const ValueName>());

@@ -79,6 +79,7 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"crash", "Crash", '>', 0, 0, 0, 10'000, 's', "open now"},
     {"insulation low", "InsulationLow", '<', 5'840, 10'000, 7'300, 60'000, 'a', "forbid charge"},
     {"insulation unknown", "InsulationUnknown", '>', 0, 60'000, 0, 10'000, 'a', "warn"},
+    {"front end hot", "FrontEndHot", '>', 9'500, 2'000, 8'500, 60'000, 'a', "open"},
 };
 
 }  // namespace bms::protection

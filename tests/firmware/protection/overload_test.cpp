@@ -81,6 +81,21 @@ TEST(Overload, OfAnySizeOpensInTheTimeOfTheTableWithItsCauseAndIsNeverMissing) {
   }
 }
 
+/// Cells for energy have limits far below 1C. The charge after the overload integral has forbidden them counts in
+/// multiples of the limit, so they do not flow for the grace time.
+TEST(Overload, OfALowLimitOpensAsSoonAsThatOfALimitOf1C) {
+  for (const double c_rate : {0.1, 0.2, 0.3, 0.5, 1.0}) {
+    PackDesign design = pack_of(200, 2'000);
+    design.limits.charge_current_max_a = design.limits.discharge_current_max_a = 200 * c_rate;
+    for (const int sign : {-1, 1}) {
+      const Opening o = open_under(design, sign * 4.9 * c_rate, 10);
+      EXPECT_GT(o.after_s, 0);
+      EXPECT_LE(o.after_s, 4.0) << 4.9 << " times a limit of " << c_rate << "C";
+      if (sign < 0) fmt::print("4.9 times a limit of {:g}C: {:.1f} s\n", c_rate, o.after_s);
+    }
+  }
+}
+
 TEST(Overload, BeyondTheRangeOfTheSensorIsAShortCircuit) {
   for (const double range_a : {20.0, 41.0, 327.67, 2'000.0, 2'147.48}) {
     for (const double share : {0.05, 0.2, 0.5, 0.59}) {

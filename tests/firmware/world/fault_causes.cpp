@@ -24,6 +24,7 @@ SetQuantity actuator_of(const Row& row) {
   }
   if (q == "warmest sensor") return [](TruckWorld& w, double c) { w.set_temperature(2, c); };
   if (q == "coldest sensor") return [](TruckWorld& w, double c) { w.set_temperature(1, c); };
+  if (q == "die of the measuring chip") return [](TruckWorld& w, double c) { w.die_c = c; };
   if (q == "sum of cells minus pack") return [](TruckWorld& w, double v) { w.sensors.stack_error_v = -v; };
   if (q == "highest minus lowest cell") {
     return [](TruckWorld& w, double v) {

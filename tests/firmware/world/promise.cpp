@@ -118,6 +118,7 @@ double Judge::value(const Row& row) const {
     }
     return shift_v;
   }
+  if (q == "die of the measuring chip") return world_.die_c;
   const bool warmest = q == "warmest sensor";
   if (!warmest && q != "coldest sensor") return std::nan("");
   double c = std::nan("");

@@ -278,6 +278,7 @@ void TruckWorld::update_chip(Bq76952Model& which, std::size_t first, std::size_t
   const plant::PinVoltages v = truck.pins();
   const bool is_lower = &which == &chip;
   Bq76952Inputs in;
+  in.internal_c = die_c;
   in.ts2_low = key_on || plugged;
   in.stack_v = is_lower ? sensors.stack_error_v : 0;
   for (std::size_t k = 0; k < count; ++k) {

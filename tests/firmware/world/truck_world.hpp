@@ -82,6 +82,7 @@ class TruckWorld {
   /// Keeps the voltage of a cell by its charge; NaN ends it.
   void hold_cell(std::size_t cell, double voltage_v);
   void set_temperature(std::size_t sensor, double celsius);
+  double die_c = 25;  ///< of the front end
   /// 0: shorted; Bq76952Inputs::open_ohm: broken
   void set_thermistor_ohm(std::size_t sensor, double ohm);
   double temperature_c(std::size_t sensor) const { return celsius_[sensor]; }

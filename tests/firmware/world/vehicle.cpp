@@ -57,7 +57,8 @@ constexpr std::array names{"cell overvoltage warning",
                            "interlock open",
                            "crash",
                            "insulation low",
-                           "insulation unknown"};
+                           "insulation unknown",
+                           "front end hot"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
                         pack_state_id = 0x180, board_id = 0x1B9, inputs_id = 0x1BA;
 constexpr double request_period_ms = 1'000;

@@ -162,6 +162,41 @@ TEST(CellFile, KnowsWhereItWasIdentifiedIfItStatesIt) {
   EXPECT_THROW(parse_cell(cell_text(cell), "wrong"), BadInput) << "the maximum is below the minimum";
 }
 
+TEST(CellFile, ReadsWritesAndChecksPulseRatings) {
+  CellFile cell = read_cell("table9");
+  EXPECT_FALSE(cell.pulses.stated());
+  EXPECT_EQ(cell_text(cell).find("[pulses]"), std::string::npos);
+  cell.sources["pulses"] = "data sheet, 6.2";
+  cell.pulses.temperature_min_c = 25;
+  cell.pulses.charge.for_10s_a = 12;
+  cell.pulses.discharge = {18.5, 13};
+  const std::string text = cell_text(cell);
+  const CellFile again = parse_cell(text, "again");
+  EXPECT_EQ(again.pulses.temperature_min_c, 25);
+  EXPECT_EQ(again.pulses.charge.for_10s_a, 12);
+  EXPECT_EQ(again.pulses.charge.for_30s_a, 0);
+  EXPECT_EQ(again.pulses.discharge.for_10s_a, 18.5);
+  EXPECT_EQ(again.pulses.discharge.for_30s_a, 13);
+  EXPECT_EQ(again.sources.at("pulses"), "data sheet, 6.2");
+  EXPECT_EQ(cell_text(again), text);
+  EXPECT_THAT(cell_refusal(replaced(text, "charge_10s_a = 12.0", "charge_10s_a = 5.9")),
+              HasSubstr("'pulses.charge_10s_a' is out of range, expected charge_current_max_a to 2000 A"));
+  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a = 13.0", "discharge_30s_a = nan")),
+              HasSubstr("'pulses.discharge_30s_a'"));
+  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a = 13.0", "discharge_30s_a = 19.0")),
+              HasSubstr("'pulses.discharge_10s_a' is out of range, expected the rating for 30 s or more"));
+  EXPECT_THAT(cell_refusal(replaced(text, "temperature_min_c = 25.0", "temperature_min_c = 61.0")),
+              HasSubstr("'pulses.temperature_min_c'"));
+  EXPECT_THAT(cell_refusal(replaced(text, "temperature_min_c = 25.0\n", "")),
+              HasSubstr("'pulses.temperature_min_c' is missing"));
+  EXPECT_THAT(cell_refusal(replaced(text, "charge_10s_a = 12.0", "charge_10s_a = 0")),
+              HasSubstr("'pulses.charge_10s_a' is 0, expected a current, or no such key"));
+  std::string none = replaced(text, "charge_10s_a = 12.0\n", "");
+  for (const char* line : {"discharge_10s_a = 18.5\n", "discharge_30s_a = 13.0\n"}) none = replaced(none, line, "");
+  EXPECT_THAT(cell_refusal(none), HasSubstr("'pulses' rates no current, expected charge_10s_a,"));
+  EXPECT_THAT(cell_refusal(replaced(text, "discharge_30s_a", "discharge_60s_a")), HasSubstr("discharge_60s_a"));
+}
+
 TEST(CellFile, RejectsABinaryFile) {
   EXPECT_THAT(cell_refusal(std::string("name = \"x\"\n[\0l]\n", 15)), HasSubstr("cell.toml:2: a control character"));
 }

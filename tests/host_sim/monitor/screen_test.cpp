@@ -45,6 +45,16 @@ TextStyle style_of(const std::vector<ScreenLine>& lines, const std::string& text
   return TextStyle::plain;
 }
 
+TEST(Screen, ShowsTheTemperatureOfTheFrontEndIfItIsSent) {
+  BusState bus = after(61);
+  can::FrontEnd front_end;
+  bus.receive(to_bus_frame(front_end.frame(0), bus.now_us()));
+  EXPECT_EQ(rows(bus, {80, 24})[3], "Pack     3.320 V   5.04 A charging   24.2 \u00b0C") << "not known";
+  front_end.die_temperature = 72;
+  bus.receive(to_bus_frame(front_end.frame(1), bus.now_us()));
+  EXPECT_EQ(rows(bus, {80, 24})[3], "Pack     3.320 V   5.04 A charging   24.2 \u00b0C   front end 72 \u00b0C");
+}
+
 TEST(Screen, On80x24ShowsTheBatteryAndTheMessages) {
   const auto r = rows(after(61), {80, 24});
   ASSERT_LE(r.size(), 24U);
