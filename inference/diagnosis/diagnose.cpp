@@ -110,10 +110,8 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
                    const Errors& errors) {
   const std::vector<Finding>& findings = d.findings;
   if (adequacy.unknown) return Verdict::unknown;
-  // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
-  const bool no_blocks = d.healthy && d.healthy->blocks == 0;
   const bool comparable =
-      std::none_of(d.withheld.begin(), d.withheld.end(), [&](const Withheld& w) { return no_blocks || w.only_place; });
+      std::none_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.only_place.has_value(); });
   const bool gross = errors.file_v > errors.certain_v || (comparable && errors.file_v > errors.gross_v);
   if (!adequacy.found && gross) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
@@ -252,7 +250,10 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
   d.gains = gains_of(grown, survivors);
   std::optional<HealthyJudge> judge_healthy;
-  if (options.healthy.known) {
+  if (options.healthy.any())
+    d.healthy = basis_of(options.healthy, coverage_of(likelihood.records(), options.healthy, d.cell.capacity_ah),
+                         options.false_alarm_rate);
+  if (d.healthy && healthy_decide(options.healthy, d.healthy->covered)) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
     survivors = judge_healthy->without_withheld(std::move(survivors));
   }
@@ -286,7 +287,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   d.verdict = verdict_of(adequacy, d, contributed, errors);
   if (search.stopped()) leave_unfinished(search, scope, d);
   add_numbers(adequacy, search.nominal_noise(), d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), judge_healthy.has_value(), d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
   if (!options.learns) add_resistances_if_understood(likelihood, survivors.best, d);
@@ -343,13 +344,18 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   Diagnosis d;
   d.cell = cell;
   if (has_data_fault(records, d)) return d;
+  // healthy recordings of which none could be compared say nothing, so they forbid nothing
+  if (options.healthy.known && !options.healthy.any())
+    d.warnings.push_back(
+        "none of the healthy recordings of the cell file could be compared with a cell file that was made without it: "
+        "the diagnosis is as without them (two like this one, bms identify --healthy)");
   if (have_trusted_readings(records)) {
     const std::vector<InstrumentError> errors = compare_instruments(records, cell);
     return with_instrument_errors(diagnose(cell, own, as_trusted(records, errors), options), errors, cell, own,
                                   records);
   }
   // what one recording names has a known false alarm rate only next to healthy ones
-  const bool one = records.size() == 1 || options.learns || !options.healthy.known;
+  const bool one = records.size() == 1 || options.learns || !options.healthy.any();
   Diagnosis together = diagnose_together(std::move(d), own, one ? std::move(records) : records, options);
   if (one || names(together.verdict) || together.interrupted) return together;
   return likeliest_alone(std::move(together), cell, own, records, [&](const PreparedRecording& r) {

@@ -97,7 +97,8 @@ double HealthyNull::log_ratio(const std::string& cause, double gain) const {
   const double floor = thresholds.decision.detected;
   double sum = 0;
   for (std::size_t b = 0; b < blocks_.size(); ++b) sum += std::log(floor + gain_of(b, cause));
-  const double usual = blocks_.empty() ? std::log(floor) : sum / static_cast<double>(blocks_.size());
+  // a single block had no other ones to be compared with: against its own level, what it shows would count twice
+  const double usual = blocks_.size() < 2 ? std::log(floor) : sum / static_cast<double>(blocks_.size());
   return std::log(floor + gain) - usual;
 }
 

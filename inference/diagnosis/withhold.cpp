@@ -51,6 +51,18 @@ double unknown_gain(const ResidualTest& residual) {
                                                   residual.far_out / thresholds.adequacy.far_out, 0.0});
 }
 
+bool healthy_decide(const healthy_data::HealthyData& healthy, const HealthyCoverage& covered) {
+  if (!healthy.blocks.empty() && covered.share >= withhold_limits.covered_at_least) return true;
+  return std::any_of(healthy.blocks.begin(), healthy.blocks.end(), [](const healthy_data::HealthyBlock& b) {
+    return std::any_of(b.gains.begin(), b.gains.end(),
+                       [](const healthy_data::HealthyGain& e) { return e.gain >= thresholds.decision.detected; });
+  });
+}
+
+HealthyBasis basis_of(const healthy_data::HealthyData& healthy, HealthyCoverage covered, double false_alarm_rate) {
+  return {healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, std::move(covered)};
+}
+
 HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                            const Scope& scope, const healthy_data::HealthyData& healthy, double false_alarm_rate)
     : search_(search),
@@ -59,7 +71,7 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
       scope_(scope),
       healthy_(healthy),
       as_read_(coverage_of(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
-      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
+      basis_(basis_of(healthy, as_read_, false_alarm_rate)),
       null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
 
 bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }
@@ -70,7 +82,7 @@ HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) cons
 
 Withheld HealthyJudge::withheld_of(std::size_t mechanism, const MechanismSetting& setting, double gain) const {
   const bool would_stand_out = null_.compare(cause_of(mechanism), gain).stands_out;
-  return {mechanism, setting, gain, compare(mechanism, gain), healthy_.blocks.empty() || would_stand_out};
+  return {mechanism, setting, gain, compare(mechanism, gain), would_stand_out};
 }
 
 std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {

@@ -20,6 +20,13 @@ double unknown_gain(const ResidualTest& residual);
 /// Largest RMS error that the cell file has on a healthy recording [V]; 0 without any.
 double largest_error_v(const healthy_data::HealthyData& healthy);
 
+/// Returns true if healthy recordings decide what may be named: they were where these recordings are, or they show
+/// causes that are not there. Others confirm the tolerance of the cell file as far as they go; elsewhere it is what is
+/// known, as without them.
+bool healthy_decide(const healthy_data::HealthyData& healthy, const HealthyCoverage& covered);
+
+HealthyBasis basis_of(const healthy_data::HealthyData& healthy, HealthyCoverage covered, double false_alarm_rate);
+
 class HealthyJudge {
  public:
   /// All must outlive it.
