@@ -250,12 +250,14 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
   d.gains = gains_of(grown, survivors);
   std::optional<HealthyJudge> judge_healthy;
-  if (options.healthy.any())
-    d.healthy = basis_of(options.healthy, coverage_of(likelihood.records(), options.healthy, d.cell.capacity_ah),
-                         options.false_alarm_rate);
-  if (d.healthy && healthy_decide(options.healthy, d.healthy->covered)) {
+  if (options.healthy.any()) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
-    survivors = judge_healthy->without_withheld(std::move(survivors));
+    Survivors compared = judge_healthy->without_withheld(survivors);
+    d.healthy = judge_healthy->basis();  // a sensor that reads too much is not a load that they have not seen
+    if (healthy_decide(options.healthy, d.healthy->covered))
+      survivors = std::move(compared);
+    else
+      judge_healthy.reset();
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);

@@ -59,10 +59,6 @@ bool healthy_decide(const healthy_data::HealthyData& healthy, const HealthyCover
   });
 }
 
-HealthyBasis basis_of(const healthy_data::HealthyData& healthy, HealthyCoverage covered, double false_alarm_rate) {
-  return {healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, std::move(covered)};
-}
-
 HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                            const Scope& scope, const healthy_data::HealthyData& healthy, double false_alarm_rate)
     : search_(search),
@@ -71,7 +67,7 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
       scope_(scope),
       healthy_(healthy),
       as_read_(coverage_of(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
-      basis_(basis_of(healthy, as_read_, false_alarm_rate)),
+      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
       null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
 
 bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }

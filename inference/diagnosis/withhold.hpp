@@ -25,8 +25,6 @@ double largest_error_v(const healthy_data::HealthyData& healthy);
 /// known, as without them.
 bool healthy_decide(const healthy_data::HealthyData& healthy, const HealthyCoverage& covered);
 
-HealthyBasis basis_of(const healthy_data::HealthyData& healthy, HealthyCoverage covered, double false_alarm_rate);
-
 class HealthyJudge {
  public:
   /// All must outlive it.
