@@ -233,6 +233,16 @@ void add_resistances_if_understood(LikelihoodModel& likelihood, const Hypothesis
   add_resistances(likelihood, best, d);
 }
 
+/// What healthy recordings leave of it if they decide. judge: nothing afterwards if they do not.
+Survivors compared_with_healthy(std::optional<HealthyJudge>& judge, const healthy_data::HealthyData& healthy,
+                                Survivors survivors, Diagnosis& d) {
+  Survivors compared = judge->without_withheld(survivors);
+  d.healthy = judge->basis();  // a sensor that reads too much is not a load that they have not seen
+  if (healthy_decide(healthy, d.healthy->covered)) return compared;
+  judge.reset();
+  return survivors;
+}
+
 /// The diagnosis of recordings that can be used. d: with the cell, and what the checks have found.
 Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& own,
                             std::vector<PreparedRecording> records, const Options& options) {
@@ -252,12 +262,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   std::optional<HealthyJudge> judge_healthy;
   if (options.healthy.any()) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
-    Survivors compared = judge_healthy->without_withheld(survivors);
-    d.healthy = judge_healthy->basis();  // a sensor that reads too much is not a load that they have not seen
-    if (healthy_decide(options.healthy, d.healthy->covered))
-      survivors = std::move(compared);
-    else
-      judge_healthy.reset();
+    survivors = compared_with_healthy(judge_healthy, options.healthy, std::move(survivors), d);
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
