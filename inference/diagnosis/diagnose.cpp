@@ -93,10 +93,11 @@ struct Errors {
   double file_v = 0;       ///< on the recordings
   double tolerated_v = 0;  ///< that noise, the tolerance of the OCV and healthy recordings explain
   double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
-  double certain_v = 0;    ///< above it something is wrong even where no healthy recording could be compared
+  double certain_v = 0;    ///< above it something is wrong even if all that speaks for a cause lies in one place
 };
 
-/// covered: share of the recordings where healthy ones were.
+/// covered: share of the recordings where healthy ones were. Their errors count also where they do not decide what is
+/// named, as the learned error does: the file was off by as much on a healthy cell, so that much proves nothing.
 Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const Options& options, double covered) {
   const double healthy_v = largest_error_v(options.healthy), times = thresholds.healthy.gross_times,
                times_there = std::max(times, error_factor(covered, options.false_alarm_rate)),
@@ -234,12 +235,10 @@ void add_resistances_if_understood(LikelihoodModel& likelihood, const Hypothesis
 }
 
 /// What healthy recordings leave of it if they decide. judge: nothing afterwards if they do not.
-Survivors compared_with_healthy(std::optional<HealthyJudge>& judge, const healthy_data::HealthyData& healthy,
-                                Survivors survivors, Diagnosis& d) {
-  Survivors compared = judge->without_withheld(survivors);
+Survivors compared_with_healthy(std::optional<HealthyJudge>& judge, Survivors survivors, Diagnosis& d) {
+  survivors = judge->without_withheld(std::move(survivors));
   d.healthy = judge->basis();  // a sensor that reads too much is not a load that they have not seen
-  if (healthy_decide(healthy, d.healthy->covered)) return compared;
-  judge.reset();
+  if (!d.healthy->decided) judge.reset();
   return survivors;
 }
 
@@ -262,7 +261,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   std::optional<HealthyJudge> judge_healthy;
   if (options.healthy.any()) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
-    survivors = compared_with_healthy(judge_healthy, options.healthy, std::move(survivors), d);
+    survivors = compared_with_healthy(judge_healthy, std::move(survivors), d);
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
@@ -361,7 +360,7 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
     return with_instrument_errors(diagnose(cell, own, as_trusted(records, errors), options), errors, cell, own,
                                   records);
   }
-  // what one recording names has a known false alarm rate only next to healthy ones
+  // what one recording names has a known false alarm rate only next to healthy ones that decide
   const bool one = records.size() == 1 || options.learns || !options.healthy.any();
   Diagnosis together = diagnose_together(std::move(d), own, one ? std::move(records) : records, options);
   if (one || names(together.verdict) || together.interrupted) return together;

@@ -86,6 +86,13 @@ HealthyNull::HealthyNull(const healthy_data::HealthyData& healthy, double rate, 
   spread_ = std::sqrt(squares / (healthy_limits.spread_counts + std::max(n - 1, 0.0)));
 }
 
+bool HealthyNull::shows_a_cause() const {
+  return std::any_of(blocks_.begin(), blocks_.end(), [](const healthy_data::HealthyBlock& b) {
+    return std::any_of(b.gains.begin(), b.gains.end(),
+                       [](const healthy_data::HealthyGain& e) { return e.gain >= thresholds.decision.detected; });
+  });
+}
+
 double HealthyNull::gain_of(std::size_t block, const std::string& cause) const {
   for (const healthy_data::HealthyGain& e : blocks_[block].gains) {
     if (e.cause == cause) return e.gain;

@@ -84,4 +84,11 @@ std::string also_withheld_text(const Diagnosis& d) {
   return fmt::format(" Not named, because healthy recordings do not exclude as much: {}.", joined(names, "and"));
 }
 
+std::string not_compared_text(const Diagnosis& d) {
+  if (!d.healthy || d.healthy->decided) return "";
+  return " The healthy recordings of this cell were elsewhere and say nothing of it: it is named by the tolerance of "
+         "the "
+         "cell file alone, without a known false alarm rate.";
+}
+
 }  // namespace bms::diagnosis

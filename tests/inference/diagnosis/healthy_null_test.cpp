@@ -13,6 +13,7 @@
 #include "diagnosis/learned_error.hpp"
 #include "diagnosis/prepare.hpp"
 #include "diagnosis/texts.hpp"
+#include "diagnosis/withhold.hpp"
 #include "tests/inference/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -96,6 +97,17 @@ TEST(HealthyNull, TheGainIsExpectedToGrowWithTheDuration) {
   EXPECT_TRUE(as_long.compare("voltage_offset", 5'000).stands_out);
   EXPECT_FALSE(longer.compare("voltage_offset", 5'000).stands_out);
   EXPECT_EQ(longer.compare("voltage_offset", 5'000).healthy_gain, 4'000);
+}
+
+/// A gain grows with the duration: nine minutes that show 25 would show 125 in 45.
+TEST(HealthyNull, AShortBlockShowsACauseIfItWouldInALongRecording) {
+  HealthyData healthy;
+  healthy.known = true;
+  healthy.blocks.push_back(block({{"voltage_offset", 25}}, 0.15));
+  const HealthyCoverage elsewhere = {0, 0, {}};
+  EXPECT_FALSE(healthy_decide(HealthyNull(healthy, 0.01, 540), elsewhere));
+  EXPECT_TRUE(healthy_decide(HealthyNull(healthy, 0.01, 2'700), elsewhere));
+  EXPECT_FALSE(healthy_decide(HealthyNull({}, 0.01, 2'700), {1, 1, {}}));
 }
 
 TEST(HealthyNull, TheGainNeededIsTheSmallestThatStandsOut) {
@@ -357,16 +369,43 @@ PreparedRecording pulsed_discharge(std::uint64_t seed, double extra_ohm = 0) {
   return test::recorded(current_a, 0.9, seed, not_in_the_model(extra_ohm));
 }
 
-TEST(DiagnoseWithHealthy, ASensorThatReadsTooMuchDoesNotHideBeyondTheHealthyCurrents) {
-  Options learning, options;
+HealthyData learned_from_pulses() {
+  Options learning;
   learning.learns = true;
-  options.healthy.known = true;
+  HealthyData healthy;
+  healthy.known = true;
   for (const std::uint64_t seed : {301U, 302U, 303U, 304U}) {
     const PreparedRecording r = pulsed_discharge(seed);
-    options.healthy.blocks.push_back(healthy_block(r, diagnose(test::table9(), {}, {r}, learning)));
+    healthy.blocks.push_back(healthy_block(r, diagnose(test::table9(), {}, {r}, learning)));
   }
+  return healthy;
+}
+
+PreparedRecording pulsed_discharge_read_too_much() {
   PreparedRecording r = pulsed_discharge(305);
   for (double& a : r.current_a.edit()) a *= 1.35;
+  return r;
+}
+
+/// With its error taken away the recording lies where the healthy ones were, so they decide: what they do not let stand
+/// out is not named by the tolerance either.
+TEST(DiagnoseWithHealthy, ASensorThatReadsTooMuchAndIsWithheldIsNotNamedByTheTolerance) {
+  Options options;
+  options.healthy = learned_from_pulses();
+  for (HealthyBlock& b : options.healthy.blocks) b.gains.clear();
+  options.false_alarm_rate = 1e-12;  // nothing stands out
+  const Diagnosis d = diagnose(test::table9(), {}, {pulsed_discharge_read_too_much()}, options);
+  ASSERT_TRUE(d.healthy.has_value());
+  EXPECT_TRUE(d.healthy->decided);
+  EXPECT_FALSE(names(d.verdict)) << name_of(d.verdict);
+  EXPECT_THAT(d.withheld,
+              testing::Contains(testing::Field(&Withheld::mechanism, model::mechanism_index("current_gain"))));
+}
+
+TEST(DiagnoseWithHealthy, ASensorThatReadsTooMuchDoesNotHideBeyondTheHealthyCurrents) {
+  Options options;
+  options.healthy = learned_from_pulses();
+  const PreparedRecording r = pulsed_discharge_read_too_much();
   const Diagnosis d = diagnose(test::table9(), {}, {r}, options);
   ASSERT_TRUE(names(d.verdict)) << name_of(d.verdict);
   EXPECT_EQ(model::catalogue[d.findings.front().setting.index].id, "current_gain");
@@ -457,7 +496,16 @@ TEST(DiagnoseWithHealthy, WhatHealthyRecordingsElsewhereConfirmTakesNoAnswerAway
   EXPECT_LT(with.healthy->covered.share, 0.5);
   ASSERT_TRUE(names(without.verdict)) << name_of(without.verdict);
   EXPECT_EQ(with.verdict, without.verdict);
-  EXPECT_FALSE(names(diagnose(test::table9(), {}, {faulty}, doubting).verdict));
+  EXPECT_FALSE(with.healthy->decided);
+  EXPECT_THAT(statement(with, {}), testing::HasSubstr("without a known false alarm rate"));
+  EXPECT_THAT(statement(without, {}), testing::Not(testing::HasSubstr("false alarm rate")));
+  const Diagnosis doubted = diagnose(test::table9(), {}, {faulty}, doubting);
+  EXPECT_FALSE(names(doubted.verdict));
+  EXPECT_TRUE(doubted.healthy->decided);
+  // an error of the model is named there as without them: they were elsewhere
+  const PreparedRecording relaxing = test::recorded(test::drive(0.5, 208), 0.3, 208, not_in_the_model());
+  EXPECT_EQ(diagnose(test::table9(), {}, {relaxing}, confirming).verdict,
+            diagnose(test::table9(), {}, {relaxing}).verdict);
   const PreparedRecording healthy = test::recorded(test::drive(0.5, 208), 0.3, 208);
   EXPECT_EQ(diagnose(test::table9(), {}, {healthy}, confirming).verdict, Verdict::not_testable)
       << "nothing found there";
