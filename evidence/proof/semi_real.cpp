@@ -40,8 +40,9 @@ struct Options {
   std::string data = "../shared/data", list = "evidence/proof/semi_real.toml", only, json;
   std::vector<std::string> faults;  ///< empty: all
   std::vector<double> times_limit;  ///< sizes, in stated detection limits; empty: those of the fault
+  std::vector<double> volts;        ///< sizes, by the RMS error that they make [V]; the same with any healthy data
   double false_alarm_rate = 0.01;
-  bool nulls_only = false, without_healthy = false, bands_only = false;
+  bool nulls_only = false, without_healthy = false, bands_only = false, one_recording = false;
 };
 
 /// The band of the prediction on the recording that is left out.
@@ -79,7 +80,8 @@ std::string id_of(std::size_t mechanism) {
 std::string withheld_of(const bms::diagnosis::Diagnosis& d) {
   std::string text;
   for (const bms::diagnosis::Withheld& w : d.withheld)
-    text += fmt::format("{}{} p {:.2g}", text.empty() ? "" : ", ", id_of(w.mechanism), w.healthy.false_alarm);
+    text += fmt::format("{}{} p {:.2g}, gain {:.3g}, healthy {:.3g}{}", text.empty() ? "" : "; ", id_of(w.mechanism),
+                        w.healthy.false_alarm, w.gain, w.healthy.healthy_gain, w.healthy.hours_needed ? "+" : "");
   return text;
 }
 
@@ -102,6 +104,10 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
     r.over_limit = fault->first_parameter(size, p.cell.parameters.capacity_ah) / limits.at(std::string(fault->id));
   }
   r.withheld = withheld_of(d);
+  r.covered = d.healthy ? d.healthy->covered.share : 1;
+  r.healthy_blocks = d.healthy ? d.healthy->blocks : 0;
+  for (const bms::healthy_data::HealthyBlock& b : p.cell.healthy.blocks)
+    r.healthy_error_v = std::max(r.healthy_error_v, b.error_v);
   r.named = bms::diagnosis::names(d.verdict);
   r.verdict = bms::diagnosis::name_of(d.verdict);
   r.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
@@ -130,9 +136,44 @@ Result diagnose(const Options& o, const RealSet& set, const Prepared& p, const R
   return r;
 }
 
+/// Measured less simulated voltage of the cell file as it is [V].
+std::vector<double> errors_v(const RealSet& set, const Prepared& p, const Recording& r) {
+  const bms::diagnosis::PreparedRecording record =
+      bms::workflow::prepared(r, set.name, p.cell, bms::workflow::start_of(r, p.cell)).record;
+  std::vector<double> e = bms::diagnosis::predict(p.cell.parameters, p.cell.mechanisms, record);
+  for (std::size_t k = 0; k < e.size(); ++k) e[k] = record.voltage_v[k] - e[k];
+  return e;
+}
+
+/// RMS by which a fault of this size changes the error [V].
+double moved_v(const RealSet& set, const Prepared& p, const InjectedFault& fault, double size) {
+  Recording faulty = p.test;
+  fault.put(faulty, size, p.cell.parameters.capacity_ah);
+  const std::vector<double> healthy_v = errors_v(set, p, p.test), faulty_v = errors_v(set, p, faulty);
+  bms::measurement::MeanSquare moved;
+  for (std::size_t k = 0; k < healthy_v.size(); ++k) {
+    const double by_v = faulty_v[k] - healthy_v[k];
+    if (std::isfinite(by_v)) moved.add(by_v);
+  }
+  return moved.root();
+}
+
+/// Size of a fault that changes the error by so much; nothing if none does.
+std::optional<double> size_that_moves(const RealSet& set, const Prepared& p, const InjectedFault& fault, double volts) {
+  constexpr int steps = 8;
+  double size = fault.size.front();
+  for (int k = 0; k < steps; ++k) {
+    const double now_v = moved_v(set, p, fault, size);
+    if (!(now_v > 0)) return std::nullopt;
+    size *= volts / now_v;
+  }
+  return size;
+}
+
 /// Sizes of a fault to put in; none if they are to be multiples of a limit that the healthy recording does not state.
 std::vector<double> sizes_of(const Options& o, const InjectedFault& fault, double capacity_ah,
                              const std::map<std::string, double>& limits) {
+  if (!o.volts.empty()) return {};
   if (o.times_limit.empty()) return {fault.size.begin(), fault.size.end()};
   const auto limit = limits.find(std::string(fault.id));
   std::vector<double> sizes;
@@ -152,6 +193,9 @@ std::vector<RealSet> sets_of(const Options& o, bms::proof::Present& present) {
     return s.name.find(o.only) == std::string::npos || !present.has(s.name, files_of(s));
   });
   fmt::print(stderr, "{}", present.skipped_text("sets"));
+  if (o.one_recording) {
+    for (RealSet& s : sets) s.calibration.resize(1);
+  }
   return sets;
 }
 
@@ -194,7 +238,11 @@ void run(const Options& o) {
     if (o.nulls_only) continue;
     for (const InjectedFault& fault : injected_faults) {
       if (!wanted(fault.id)) continue;
-      for (const double size : sizes_of(o, fault, p.cell.parameters.capacity_ah, limits)) {
+      std::vector<double> sizes = sizes_of(o, fault, p.cell.parameters.capacity_ah, limits);
+      for (const double v : o.volts) {
+        if (const auto size = size_that_moves(set, p, fault, v)) sizes.push_back(*size);
+      }
+      for (const double size : sizes) {
         Recording r = p.test;
         fault.put(r, size, p.cell.parameters.capacity_ah);
         add(diagnose(o, set, p, r, &fault, size, limits));
@@ -222,8 +270,11 @@ int main(int argc, char** argv) {
   app.add_option("--times-limit", o.times_limit,
                  "sizes of the faults, as multiples of the detection limit that the healthy recording states")
       ->type_name("X");
+  app.add_option("--volts", o.volts, "sizes of the faults, by the RMS error that they make")->type_name("V");
   app.add_option("--false-alarm-rate", o.false_alarm_rate, "as of bms diagnose")->capture_default_str();
   app.add_flag("--without-healthy", o.without_healthy, "learn nothing from the healthy recordings");
+  app.add_flag("--one-recording", o.one_recording,
+               "identify the cell from the first of its recordings, and learn from that alone");
   app.add_flag("--bands", o.bands_only, "diagnose nothing: how many readings lie within the band of the prediction");
   app.add_flag("--nulls-only", o.nulls_only, "put in no faults");
   return bms::files::run_program(app, argc, argv, [&] { run(o); });

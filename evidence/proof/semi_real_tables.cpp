@@ -271,6 +271,9 @@ std::string json_of(const std::vector<Result>& results, const NotRun& not_run) {
                     {"band_over_error", or_null(r.band_over_error)},
                     {"error_v", r.error_v},
                     {"remaining_v", r.remaining_v},
+                    {"healthy_error_v", r.healthy_error_v},
+                    {"healthy_blocks", r.healthy_blocks},
+                    {"covered", r.covered},
                     {"hours", r.hours},
                     {"wall_s", r.wall_s}});
   }

@@ -1,6 +1,7 @@
 // The results of the semi-real benchmark and their tables.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,9 @@ struct SemiRealResult {
   std::optional<double> band_within;      ///< of a null: share of the readings within the 95 % band of the prediction
   std::optional<double> band_over_error;  ///< of a null: RMS of the band's half width over that of the error
   double error_v = 0, remaining_v = 0, wall_s = 0, hours = 0;
+  double healthy_error_v = 0;      ///< the largest of a healthy block; 0 without any
+  double covered = 1;              ///< share of the recording where healthy ones were
+  std::size_t healthy_blocks = 0;  ///< that it was compared with
 };
 
 std::string line_of(const SemiRealResult& r);

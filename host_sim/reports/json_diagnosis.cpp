@@ -194,10 +194,12 @@ Json search_of(const diagnosis::Diagnosis& d) {
 
 Json healthy_of(const diagnosis::Diagnosis& d) {
   const diagnosis::HealthyBasis h = d.healthy.value_or(diagnosis::HealthyBasis{});
+  const bool decided = d.healthy && h.decided;
   return {{"hours", number(h.hours)},
           {"recordings", h.recordings},
           {"blocks", h.blocks},
-          {"false_alarm_rate", d.healthy ? number(h.false_alarm_rate) : Json(nullptr)},
+          {"decided", decided},
+          {"false_alarm_rate", decided ? number(h.false_alarm_rate) : Json(nullptr)},
           {"covered", d.healthy ? number(h.covered.share) : Json(nullptr)},
           {"least_covered", d.healthy ? number(h.covered.least) : Json(nullptr)},
           {"beyond", beyond_of(h.covered)}};

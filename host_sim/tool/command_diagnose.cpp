@@ -159,7 +159,8 @@ class DiagnoseCommand final : public Command {
         ->check(Within(0.0, 1.0));
     c.add_option("--out", out_, "cell file to write, with the findings")->type_name("EXTENDED.toml");
     c.add_option("--false-alarm-rate", false_alarm_rate_,
-                 "how often a healthy recording may be blamed; for a cell file with [healthy] (bms identify --healthy)")
+                 "how often a healthy recording may be blamed where the [healthy] of the cell file decides (bms "
+                 "identify --healthy)")
         ->check(Within(1e-4, 0.5))
         ->capture_default_str();
     add_reading(c, o_.reading);

@@ -93,10 +93,11 @@ struct Errors {
   double file_v = 0;       ///< on the recordings
   double tolerated_v = 0;  ///< that noise, the tolerance of the OCV and healthy recordings explain
   double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
-  double certain_v = 0;    ///< above it something is wrong even where no healthy recording could be compared
+  double certain_v = 0;    ///< above it something is wrong even if all that speaks for a cause lies in one place
 };
 
-/// covered: share of the recordings where healthy ones were.
+/// covered: share of the recordings where healthy ones were. Their errors count also where they do not decide what is
+/// named, as the learned error does: the file was off by as much on a healthy cell, so that much proves nothing.
 Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const Options& options, double covered) {
   const double healthy_v = largest_error_v(options.healthy), times = thresholds.healthy.gross_times,
                times_there = std::max(times, error_factor(covered, options.false_alarm_rate)),
@@ -110,10 +111,8 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
                    const Errors& errors) {
   const std::vector<Finding>& findings = d.findings;
   if (adequacy.unknown) return Verdict::unknown;
-  // a tolerance as wide as this says that the cell file is not known, not that the cell is healthy
-  const bool no_blocks = d.healthy && d.healthy->blocks == 0;
   const bool comparable =
-      std::none_of(d.withheld.begin(), d.withheld.end(), [&](const Withheld& w) { return no_blocks || w.only_place; });
+      std::none_of(d.withheld.begin(), d.withheld.end(), [](const Withheld& w) { return w.only_place.has_value(); });
   const bool gross = errors.file_v > errors.certain_v || (comparable && errors.file_v > errors.gross_v);
   if (!adequacy.found && gross) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
@@ -235,6 +234,14 @@ void add_resistances_if_understood(LikelihoodModel& likelihood, const Hypothesis
   add_resistances(likelihood, best, d);
 }
 
+/// What healthy recordings leave of it if they decide. judge: nothing afterwards if they do not.
+Survivors compared_with_healthy(std::optional<HealthyJudge>& judge, Survivors survivors, Diagnosis& d) {
+  survivors = judge->without_withheld(std::move(survivors));
+  d.healthy = judge->basis();  // a sensor that reads too much is not a load that they have not seen
+  if (!d.healthy->decided) judge.reset();
+  return survivors;
+}
+
 /// The diagnosis of recordings that can be used. d: with the cell, and what the checks have found.
 Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& own,
                             std::vector<PreparedRecording> records, const Options& options) {
@@ -252,9 +259,9 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   Survivors survivors = eliminate(search, likelihood, control, grown.fit, scope);
   d.gains = gains_of(grown, survivors);
   std::optional<HealthyJudge> judge_healthy;
-  if (options.healthy.known) {
+  if (options.healthy.any()) {
     judge_healthy.emplace(search, likelihood, control, scope, options.healthy, options.false_alarm_rate);
-    survivors = judge_healthy->without_withheld(std::move(survivors));
+    survivors = compared_with_healthy(judge_healthy, std::move(survivors), d);
   }
   if (!options.learns) survivors = without_uncertain(search, likelihood, control, scope, std::move(survivors));
   Adequacy adequacy = judge(likelihood, search.nominal_noise(), control, survivors);
@@ -286,7 +293,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   d.verdict = verdict_of(adequacy, d, contributed, errors);
   if (search.stopped()) leave_unfinished(search, scope, d);
   add_numbers(adequacy, search.nominal_noise(), d);
-  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), options.healthy.known, d);
+  if (!options.learns) add_law_term(likelihood, search.nominal_noise(), judge_healthy.has_value(), d);
   add_location(likelihood, survivors.best, contributed, adequacy, errors, d);
   add_extended_cell(likelihood, survivors.best, d);
   if (!options.learns) add_resistances_if_understood(likelihood, survivors.best, d);
@@ -343,13 +350,18 @@ Diagnosis diagnose(const model::CellParameters<>& cell, const std::vector<Mechan
   Diagnosis d;
   d.cell = cell;
   if (has_data_fault(records, d)) return d;
+  // healthy recordings of which none could be compared say nothing, so they forbid nothing
+  if (options.healthy.known && !options.healthy.any())
+    d.warnings.push_back(
+        "none of the healthy recordings of the cell file could be compared with a cell file that was made without it: "
+        "the diagnosis is as without them (two like this one, bms identify --healthy)");
   if (have_trusted_readings(records)) {
     const std::vector<InstrumentError> errors = compare_instruments(records, cell);
     return with_instrument_errors(diagnose(cell, own, as_trusted(records, errors), options), errors, cell, own,
                                   records);
   }
-  // what one recording names has a known false alarm rate only next to healthy ones
-  const bool one = records.size() == 1 || options.learns || !options.healthy.known;
+  // what one recording names has a known false alarm rate only next to healthy ones that decide
+  const bool one = records.size() == 1 || options.learns || !options.healthy.any();
   Diagnosis together = diagnose_together(std::move(d), own, one ? std::move(records) : records, options);
   if (one || names(together.verdict) || together.interrupted) return together;
   return likeliest_alone(std::move(together), cell, own, records, [&](const PreparedRecording& r) {

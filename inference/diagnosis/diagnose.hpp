@@ -17,10 +17,11 @@ namespace bms::diagnosis {
 
 struct Options {
   std::size_t most_mechanisms = 6;
-  healthy_data::HealthyData healthy;  ///< of the cell; if it is not known, nothing is withheld, but its regimes hold
+  healthy_data::HealthyData healthy;  ///< of the cell; without blocks it withholds nothing, but its regimes hold
   bool learns = false;  ///< the recordings are healthy: Diagnosis::unknown_gain is the larger one of that with
                         ///< and that without the findings
-  double false_alarm_rate = 0.01;  ///< with `healthy`: how often a healthy recording may be blamed
+  double false_alarm_rate = 0.01;  ///< where `healthy` decides (healthy_decide): how often a healthy recording may be
+                                   ///< blamed
   Progress progress;
   Stopped stopped;  ///< asked between fits; the diagnosis then ends with what it knows so far
 };

@@ -86,6 +86,13 @@ HealthyNull::HealthyNull(const healthy_data::HealthyData& healthy, double rate, 
   spread_ = std::sqrt(squares / (healthy_limits.spread_counts + std::max(n - 1, 0.0)));
 }
 
+bool HealthyNull::shows_a_cause() const {
+  return std::any_of(blocks_.begin(), blocks_.end(), [](const healthy_data::HealthyBlock& b) {
+    return std::any_of(b.gains.begin(), b.gains.end(),
+                       [](const healthy_data::HealthyGain& e) { return e.gain >= thresholds.decision.detected; });
+  });
+}
+
 double HealthyNull::gain_of(std::size_t block, const std::string& cause) const {
   for (const healthy_data::HealthyGain& e : blocks_[block].gains) {
     if (e.cause == cause) return e.gain;
@@ -97,7 +104,8 @@ double HealthyNull::log_ratio(const std::string& cause, double gain) const {
   const double floor = thresholds.decision.detected;
   double sum = 0;
   for (std::size_t b = 0; b < blocks_.size(); ++b) sum += std::log(floor + gain_of(b, cause));
-  const double usual = blocks_.empty() ? std::log(floor) : sum / static_cast<double>(blocks_.size());
+  // a single block had no other ones to be compared with: against its own level, what it shows would count twice
+  const double usual = blocks_.size() < 2 ? std::log(floor) : sum / static_cast<double>(blocks_.size());
   return std::log(floor + gain) - usual;
 }
 

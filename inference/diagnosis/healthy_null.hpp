@@ -50,6 +50,8 @@ class HealthyNull {
   HealthyComparison compare(const std::string& cause, double gain, double covered = 1) const;
   /// The smallest gain of a cause that would stand out; nothing with too few blocks.
   std::optional<double> gain_needed(const std::string& cause, double covered = 1) const;
+  /// Whether a block shows any cause, as in a recording of the duration to be diagnosed.
+  bool shows_a_cause() const;
   double hours() const { return hours_; }
   std::size_t blocks() const { return level_of_block_.size(); }
 

@@ -44,7 +44,8 @@ Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cel
       return together;
     }
     const double gain = one.base_cost - one.best_cost;
-    if (!names(one.verdict) || (likeliest && gain <= likeliest->base_cost - likeliest->best_cost)) continue;
+    if (!names(one.verdict) || !one.healthy || !one.healthy->decided) continue;  // else of no known false alarm rate
+    if (likeliest && gain <= likeliest->base_cost - likeliest->best_cost) continue;
     likeliest = std::move(one);
     of = n;
   }
@@ -57,7 +58,6 @@ Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cel
   };
   for (MechanismSetting& s : d.extended.settings) not_in_the_first(s);
   set_views(d, cell, own, records);
-  d.healthy = together.healthy;
   d.warnings = std::move(together.warnings);
   d.warnings.push_back(fmt::format("the recordings together are not explained: the answer is that of {} alone",
                                    records[of].name.empty() ? "one of them" : records[of].name));

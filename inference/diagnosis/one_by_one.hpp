@@ -20,8 +20,8 @@ std::vector<MechanismSetting> settings_in(const std::vector<PreparedRecording>& 
 void set_views(Diagnosis& d, const model::CellParameters<>& cell, const std::vector<MechanismSetting>& own,
                const std::vector<PreparedRecording>& records);
 
-/// The answer of the recording that names a cause with the largest gain; `together`, which names none, if none does.
-/// The false alarm rate is that of one recording, as always.
+/// The answer of the recording that names a cause with the largest gain, of those for which healthy recordings decide
+/// (HealthyBasis::decided): the false alarm rate is that of one recording. `together`, which names none, if none does.
 Diagnosis likeliest_alone(Diagnosis together, const model::CellParameters<>& cell,
                           const std::vector<MechanismSetting>& own, const std::vector<PreparedRecording>& records,
                           const std::function<Diagnosis(const PreparedRecording&)>& diagnose_one);

@@ -243,11 +243,11 @@ std::string statement(const Diagnosis& d, const RecordingFacts& facts) {
     case Verdict::no_mismatch:
       return d.withheld.empty() ? no_mismatch_text(d, facts) : withheld_text(d, model_error(facts));
     case Verdict::cause:
-      return cause_text(d, facts) + also_withheld_text(d);
+      return cause_text(d, facts) + also_withheld_text(d) + not_compared_text(d);
     case Verdict::ambiguous:
-      return ambiguous_text(d, facts) + also_withheld_text(d);
+      return ambiguous_text(d, facts) + also_withheld_text(d) + not_compared_text(d);
     case Verdict::causes:
-      return causes_text(d, facts) + also_withheld_text(d);
+      return causes_text(d, facts) + also_withheld_text(d) + not_compared_text(d);
     case Verdict::unknown:
       return unknown_text(d, facts);
     case Verdict::data_fault:

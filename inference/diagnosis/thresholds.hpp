@@ -244,9 +244,9 @@ struct Thresholds {
     double cause_explains = 0.1;   ///< share of the squared error, where it acts, that a cause explains at least
     double gross_v = 0.1;          ///< [V] RMS error above which a cell is never called healthy, whatever the tolerance
     double certain_times = 10;     ///< of the error that healthy recordings show or the tolerance states, above which
-                                   ///< something is wrong, also where no healthy recording could be compared. The
-                                   ///< error of healthy ones where none was is larger by a factor of 3 (RMS; second
-                                   ///< halves of eight A123 drives)
+                                   ///< something is wrong, also if all that speaks for a cause lies in one place.
+                                   ///< The error of healthy ones where none was is larger by a factor of 3 (RMS;
+                                   ///< second halves of eight A123 drives)
     double error_may_grow = 1.15;  ///< of the error without the start's and the sensor's own unknowns, by adding
                                    ///< a cause,
     double error_may_grow_v = 3e-4;  ///< [V] plus this

@@ -127,12 +127,14 @@ struct Withheld {
   std::optional<model::Span> only_place = std::nullopt;
 };
 
-/// The healthy data that a diagnosis was compared with.
+/// The healthy data of a cell file.
 struct HealthyBasis {
   double hours = 0;
   std::size_t recordings = 0, blocks = 0;
   double false_alarm_rate = 0;
   HealthyCoverage covered = {1, 1, {}};
+  bool decided = true;  ///< what may be named (healthy_decide); otherwise the answer is as without them, and
+                        ///< false_alarm_rate was not applied
 };
 
 /// For plots, one value per row.
@@ -161,7 +163,7 @@ struct Diagnosis {
   std::vector<std::string> warnings;
   std::vector<MechanismGain> gains;     ///< of all mechanisms with any; before anything was withheld
   double unknown_gain = 0;              ///< that something else is there, before anything was withheld
-  std::optional<HealthyBasis> healthy;  ///< nothing: the cell file has no healthy data
+  std::optional<HealthyBasis> healthy;  ///< nothing: the cell file has none that can be compared
   std::vector<Withheld> withheld;       ///< the largest gain first
   std::optional<LawTerm> law;           ///< of an unknown cause
   Hypothesis extended;                  ///< the cell's own mechanisms and those found

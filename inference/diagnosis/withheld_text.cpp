@@ -31,7 +31,6 @@ std::string text_of(const BeyondHealthy& b) {
 
 /// "only 12 % of it lies at states of charge, ... of the healthy recordings: its temperature is ..."
 std::string not_covered_reason(const HealthyBasis& healthy) {
-  if (healthy.blocks == 0) return "no healthy recording could be compared with a cell file that was made without it";
   std::vector<std::string> beyond;
   for (const BeyondHealthy& b : healthy.covered.beyond) beyond.push_back(text_of(b));
   return fmt::format(
@@ -57,10 +56,7 @@ std::string reason_of(const Withheld& w, const Diagnosis& of) {
 }
 
 std::string withheld_text(const Diagnosis& d, const std::string& error) {
-  const std::string there =
-      d.healthy && d.healthy->blocks == 0
-          ? "Identify the cell again with at least two healthy recordings like this one (bms identify --healthy)."
-          : "Identify the cell again with healthy recordings there (bms identify --healthy).";
+  const std::string there = "Identify the cell again with healthy recordings there (bms identify --healthy).";
   // what more data would decide first
   const auto undecided = std::find_if(d.withheld.begin(), d.withheld.end(),
                                       [](const Withheld& w) { return w.not_covered || w.healthy.hours_needed; });
@@ -86,6 +82,13 @@ std::string also_withheld_text(const Diagnosis& d) {
   std::vector<std::string> names;
   for (const Withheld& w : d.withheld) names.push_back(name_of(w));
   return fmt::format(" Not named, because healthy recordings do not exclude as much: {}.", joined(names, "and"));
+}
+
+std::string not_compared_text(const Diagnosis& d) {
+  if (!d.healthy || d.healthy->decided) return "";
+  return " The healthy recordings of this cell were elsewhere and say nothing of it: it is named by the tolerance of "
+         "the "
+         "cell file alone, without a known false alarm rate.";
 }
 
 }  // namespace bms::diagnosis

@@ -16,4 +16,7 @@ std::string withheld_text(const Diagnosis& diagnosis, const std::string& error);
 /// A sentence for a verdict that names other causes; empty if nothing was withheld.
 std::string also_withheld_text(const Diagnosis& diagnosis);
 
+/// A sentence for a verdict that names causes which were not compared with the healthy recordings; empty otherwise.
+std::string not_compared_text(const Diagnosis& diagnosis);
+
 }  // namespace bms::diagnosis

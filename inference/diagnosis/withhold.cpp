@@ -51,6 +51,11 @@ double unknown_gain(const ResidualTest& residual) {
                                                   residual.far_out / thresholds.adequacy.far_out, 0.0});
 }
 
+bool healthy_decide(const HealthyNull& null, const HealthyCoverage& covered) {
+  if (null.blocks() == 0) return false;
+  return covered.share >= withhold_limits.covered_at_least || null.shows_a_cause();
+}
+
 HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& control,
                            const Scope& scope, const healthy_data::HealthyData& healthy, double false_alarm_rate)
     : search_(search),
@@ -59,7 +64,7 @@ HealthyJudge::HealthyJudge(Search& search, const LikelihoodModel& likelihood, co
       scope_(scope),
       healthy_(healthy),
       as_read_(coverage_of(likelihood.records(), healthy, likelihood.cell().capacity_ah)),
-      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_},
+      basis_{healthy.hours(), healthy.recordings(), healthy.blocks.size(), false_alarm_rate, as_read_, true},
       null_(healthy, false_alarm_rate, total_duration_s(likelihood.records())) {}
 
 bool HealthyJudge::is_covered() const { return basis_.covered.share >= withhold_limits.covered_at_least; }
@@ -70,7 +75,7 @@ HealthyComparison HealthyJudge::compare(std::size_t mechanism, double gain) cons
 
 Withheld HealthyJudge::withheld_of(std::size_t mechanism, const MechanismSetting& setting, double gain) const {
   const bool would_stand_out = null_.compare(cause_of(mechanism), gain).stands_out;
-  return {mechanism, setting, gain, compare(mechanism, gain), healthy_.blocks.empty() || would_stand_out};
+  return {mechanism, setting, gain, compare(mechanism, gain), would_stand_out};
 }
 
 std::optional<Withheld> HealthyJudge::least_of(const Survivors& found) const {
@@ -118,11 +123,15 @@ Survivors HealthyJudge::with_current_sensor(Survivors found) {
 }
 
 Survivors HealthyJudge::without_withheld(Survivors found) {
+  Survivors as_found = found;
   cover_true_current(found);
   if (!is_covered()) {
     found = with_current_sensor(std::move(found));
     cover_true_current(found);
   }
+  // before a sensor's error is removed, which would leave the current as it is read
+  basis_.decided = healthy_decide(null_, basis_.covered);
+  if (!basis_.decided) return as_found;
   for (bool removed = true; removed;) {
     removed = false;
     while (std::optional<Withheld> least = least_of(found)) {

@@ -20,6 +20,11 @@ double unknown_gain(const ResidualTest& residual);
 /// Largest RMS error that the cell file has on a healthy recording [V]; 0 without any.
 double largest_error_v(const healthy_data::HealthyData& healthy);
 
+/// Returns true if healthy recordings decide what may be named: they were where these recordings are, or they show
+/// causes that are not there. Others confirm the tolerance of the cell file as far as they go; elsewhere it is what is
+/// known, as without them.
+bool healthy_decide(const HealthyNull& null, const HealthyCoverage& covered);
+
 class HealthyJudge {
  public:
   /// All must outlive it.
@@ -29,8 +34,8 @@ class HealthyJudge {
   const HealthyBasis& basis() const { return basis_; }
   std::vector<Withheld> withheld() const;
 
-  /// Removes mechanisms that do not stand out, the least one first, each time with the others fitted again. What is
-  /// left is compared with its rivals again.
+  /// If healthy recordings decide: removes mechanisms that do not stand out, the least one first, each time with the
+  /// others fitted again. What is left is compared with its rivals again.
   Survivors without_withheld(Survivors found);
 
   /// The smallest gain at which a mechanism would stand out; nothing if it could not.

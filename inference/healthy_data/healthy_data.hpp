@@ -61,6 +61,8 @@ struct HealthyData {
   /// RMS of the error [V] that the noise and the tolerance of the cell file do not explain.
   double beyond_tolerance_v = 0;
 
+  /// Whether there is something to compare a recording with.
+  bool any() const { return !blocks.empty(); }
   double hours() const {
     double sum_s = 0;
     for (const HealthyBlock& b : blocks) sum_s += b.duration_s;

@@ -185,6 +185,7 @@ TEST(OneByOne, WhatOneRecordingShowsIsNotLost) {
     d.extended = {{}, 0, {}};
     if (&r == &records.front() || r.voltage_v == records[0].voltage_v) return d;
     d.verdict = Verdict::cause;
+    d.healthy = HealthyBasis{};
     d.base_cost = r.voltage_v == records[1].voltage_v ? 500 : 100;
     model::MechanismSetting contact = model::default_setting(model::mechanism_index_of<model::ContactStep>, d.cell);
     contact.value[0] = d.base_cost / 1e4;
@@ -201,6 +202,17 @@ TEST(OneByOne, WhatOneRecordingShowsIsNotLost) {
 
   const auto none = [&](const PreparedRecording& r) { return one(r.name.empty() ? r : records.front()); };
   EXPECT_EQ(likeliest_alone(together, test::table9(), {}, records, none).verdict, Verdict::unknown);
+
+  for (const bool compared : {true, false}) {
+    const auto not_decided = [&](const PreparedRecording& r) {
+      Diagnosis of = one(r);
+      if (of.healthy) of.healthy->decided = false;
+      if (!compared) of.healthy.reset();
+      return of;
+    };
+    EXPECT_EQ(likeliest_alone(together, test::table9(), {}, records, not_decided).verdict, Verdict::unknown)
+        << "at no known false alarm rate";
+  }
 }
 
 }  // namespace
