@@ -87,8 +87,7 @@ std::string also_withheld_text(const Diagnosis& d) {
 std::string not_compared_text(const Diagnosis& d) {
   if (!d.healthy || d.healthy->decided) return "";
   return " The healthy recordings of this cell were elsewhere and say nothing of it: it is named by the tolerance of "
-         "the "
-         "cell file alone, without a known false alarm rate.";
+         "the cell file alone, without a known false alarm rate.";
 }
 
 }  // namespace bms::diagnosis
