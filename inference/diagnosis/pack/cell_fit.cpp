@@ -228,6 +228,23 @@ double square_of_prior(const Vector& theta, const Vector& prior) {
   return (theta.array() / prior.array()).square().sum();
 }
 
+/// NaN where a row is not used.
+std::vector<double> residual_of(const Linearised& l) {
+  std::vector<double> residual_v(l.usable.size(), no_value);
+  for (std::size_t k = 0; k < residual_v.size(); ++k) {
+    if (l.usable[k] != 0) residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
+  }
+  return residual_v;
+}
+
+double white_square(const Whitener& whitener, std::vector<double> residual_v) {
+  for (double& v : residual_v) v = std::isfinite(v) ? v : 0;
+  whitener.whiten(0, residual_v);
+  double square = 0;
+  for (const double v : residual_v) square += v * v;
+  return square;
+}
+
 /// Linearised and whitened around theta; cost: -2 log posterior but for a constant.
 CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, const NoiseModel& noise) {
   CellFit fit;
@@ -236,12 +253,7 @@ CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, 
   Linearised l = linearise(input, theta, noise.edge);
   const Whitener whitener(noise, input.pack->time_s, l.noise, l.usable);
   fit.difference_v = std::move(l.difference_v);
-  fit.residual_v.assign(input.pack->rows(), no_value);
-  for (std::size_t k = 0; k < fit.residual_v.size(); ++k) {
-    if (l.usable[k] != 0) fit.residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
-  }
-  fit.lasting_v2 = l.noise.slow_v2;
-  for (double& v2 : fit.lasting_v2) v2 += noise.slow_v * noise.slow_v;
+  fit.residual_v = residual_of(l);
   whitener.whiten(l.columns);
   fit.used = whitener.used();
   fit.white = std::move(l.columns);
@@ -253,29 +265,14 @@ CellFit around(const FitInput& input, const Vector& theta, const Vector& prior, 
   return fit;
 }
 
-/// The fit at theta, if its cost is less.
-std::optional<Improved<CellFit>> improved_by(const FitInput& input, const CellFit& best, const Vector& theta,
-                                             const Vector& prior) {
-  CellFit next = around(input, theta, prior, best.noise);
-  const double gain = best.cost - next.cost;
-  if (!(gain > 0)) return std::nullopt;
-  return Improved<CellFit>{std::move(next), gain};
-}
-
 /// The fit at theta, if it explains the readings better with the noise that they have around `best`. The noise grows
 /// with the size of a delay or a resistance, whichever its sign: at 0 the cost has an edge that no step may get over.
 std::optional<Improved<CellFit>> improved_with_same_noise(const FitInput& input, const CellFit& best,
                                                           const Vector& theta, const Vector& prior) {
   const Linearised l = linearise(input, theta, best.noise.edge);
   const Whitener whitener(best.noise, input.pack->time_s, best.row_noise, l.usable);
-  std::vector<double> residual_v(input.pack->rows(), 0.0);
-  for (std::size_t k = 0; k < residual_v.size(); ++k) {
-    if (l.usable[k] != 0) residual_v[k] = l.columns(static_cast<Eigen::Index>(k), parameter_count);
-  }
-  whitener.whiten(0, residual_v);
-  double cost = square_of_prior(theta, prior);
-  for (const double v : residual_v) cost += v * v;
-  const double gain = best.square + square_of_prior(best.theta, prior) - cost;
+  const double gain = best.square + square_of_prior(best.theta, prior) - white_square(whitener, residual_of(l)) -
+                      square_of_prior(theta, prior);
   if (!(gain > 0)) return std::nullopt;
   return Improved<CellFit>{around(input, theta, prior, best.noise), gain};
 }
@@ -328,18 +325,23 @@ Vector starting_point(const FitInput& input, double lag_s) {
 CellFit fit_cell(const FitInput& input, const Vector& start, const Vector& prior, const NoiseModel& noise) {
   const auto normal = [&](const CellFit& fit) { return normal_of(fit.all(), prior); };
   const auto target = [&](const CellFit& fit) -> Vector { return normal(fit).ldlt().solve(fit.all().with_data); };
-  const auto fit_by = [&](CellFit from, const auto& improved_at) {
-    const auto improved = [&](const CellFit& best, const Vector& theta) {
-      return improved_at(input, best, theta, prior);
-    };
+  const auto fit_by = [&](CellFit from, const auto& improved) {
     return damped_fit(std::move(from), &CellFit::theta, limits.fit.iterations, improved, normal, target);
   };
-  CellFit fit = fit_by(around(input, start, prior, noise), improved_by);
-  if (fit.theta == start) fit = fit_by(std::move(fit), improved_with_same_noise);
+  CellFit fit = fit_by(around(input, start, prior, noise), [&](const CellFit& best, const Vector& theta) {
+    return if_less(best, around(input, theta, prior, noise));
+  });
+  if (fit.theta == start) {
+    fit = fit_by(std::move(fit), [&](const CellFit& best, const Vector& theta) {
+      return improved_with_same_noise(input, best, theta, prior);
+    });
+  }
   weigh_by_misfit(fit);
   add_information(input, fit);
   fit.white.resize(0, 0);
   fit.soc = {};
+  fit.lasting_v2 = std::move(fit.row_noise.slow_v2);
+  for (double& v2 : fit.lasting_v2) v2 += noise.slow_v * noise.slow_v;
   fit.row_noise = RowNoise();
   return fit;
 }
@@ -351,12 +353,7 @@ NoiseModel noise_of(const FitInput& input, const CellFit& fit) {
     RowNoise rows = l.noise;
     for (double& white_v2 : rows.white_v2) white_v2 /= noise.edge * noise.edge;
     const Whitener whitener(noise, time_s, rows, l.usable);
-    std::vector<double> r(fit.residual_v);
-    for (double& v : r) v = std::isfinite(v) ? v : 0;
-    whitener.whiten(0, r);
-    double square = 0;
-    for (const double v : r) square += v * v;
-    return square + whitener.log_determinant();
+    return white_square(whitener, fit.residual_v) + whitener.log_determinant();
   });
 }
 

@@ -50,7 +50,7 @@ struct CellFit {
   Columns white;                     ///< while it is fitted: the columns of the parameters, and last the residual
   std::vector<double> soc;           ///< the same: of the cell, by row
   RowNoise row_noise;                ///< the same
-  std::vector<double> lasting_v2;    ///< its expected part that lasts [V^2], by row
+  std::vector<double> lasting_v2;    ///< the part of its variance that lasts [V^2], by row; once fitted
   std::size_t used = 0;
   double cost = 0;    ///< -2 log posterior of theta but for a constant
   double square = 0;  ///< of the white difference, with all rows

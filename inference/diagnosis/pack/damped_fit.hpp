@@ -15,6 +15,14 @@ struct Improved {
   double gain;
 };
 
+/// `next`, if its cost is less than that of `best`.
+template <class Fit>
+std::optional<Improved<Fit>> if_less(const Fit& best, Fit next) {
+  const double gain = best.cost - next.cost;
+  if (!(gain > 0)) return std::nullopt;
+  return Improved<Fit>{std::move(next), gain};
+}
+
 /// best: linearised at the member `place`. improved(best, place): the fit there, or nothing if its cost is not less.
 /// normal(fit): matrix of the normal equations; target(fit): the place that is best if the model is linear. Ends after
 /// `iterations`, or when the cost falls, or is expected to fall, by less than limits.fit.converged.

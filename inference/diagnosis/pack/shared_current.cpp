@@ -77,11 +77,8 @@ Normal normal_of(const Around& a, const Unknowns& prior) {
 }
 
 Around fit_from(const Problem& p, const Unknowns& from, const Unknowns& prior, const NoiseModel& noise) {
-  const auto improved = [&](const Around& best, const Unknowns& u) -> std::optional<Improved<Around>> {
-    Around next = around(p, u, prior, noise);
-    const double gain = best.cost - next.cost;
-    if (!(gain > 0)) return std::nullopt;
-    return Improved<Around>{std::move(next), gain};
+  const auto improved = [&](const Around& best, const Unknowns& u) {
+    return if_less(best, around(p, u, prior, noise));
   };
   const auto normal = [&](const Around& fit) { return normal_of(fit, prior); };
   const auto target = [&](const Around& fit) -> Unknowns { return normal(fit).ldlt().solve(fit.with_data); };
