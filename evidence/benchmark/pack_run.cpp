@@ -6,7 +6,6 @@
 
 #include "benchmark/truth/case_files.hpp"
 #include "files/cell_file.hpp"
-#include "workflow/pack_diagnosis.hpp"
 
 namespace bms::benchmark {
 
@@ -29,12 +28,16 @@ const char* word_for(const PlantedOutcome& p) {
 
 }  // namespace
 
-PackOutcome run_pack(const truth::PackCase& c, bool shared) {
+workflow::PackResult diagnose(const truth::PackCase& c, bool shared) {
   workflow::PackOptions options;
   options.shared = shared;
   options.initial_soc = c.given_initial_soc;
   const auto cell = files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
-  const workflow::PackResult r = workflow::diagnose_pack(cell, recording_of(c.recording), options);
+  return workflow::diagnose_pack(cell, recording_of(c.recording), options);
+}
+
+PackOutcome run_pack(const truth::PackCase& c, bool shared) {
+  const workflow::PackResult r = diagnose(c, shared);
   PackOutcome o = score_pack(c, r.diagnosis);
   o.wall_s = r.wall_s;
   return o;

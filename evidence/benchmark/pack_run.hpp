@@ -3,10 +3,14 @@
 
 #include "benchmark/pack_score.hpp"
 #include "benchmark/truth/packs.hpp"
+#include "workflow/pack_diagnosis.hpp"
 
 namespace bms::benchmark {
 
 /// shared: the mean of the cells is diagnosed as one cell as well.
+workflow::PackResult diagnose(const truth::PackCase& c, bool shared);
+
+/// The same, scored.
 PackOutcome run_pack(const truth::PackCase& c, bool shared);
 
 /// To stdout: a line for the pack, and one for each planted fault and each wrong answer.

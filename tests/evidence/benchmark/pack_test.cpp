@@ -6,11 +6,8 @@
 
 #include <gtest/gtest.h>
 
-#include "benchmark/pack_score.hpp"
-#include "benchmark/truth/case_files.hpp"
+#include "benchmark/pack_run.hpp"
 #include "benchmark/truth/packs.hpp"
-#include "files/cell_file.hpp"
-#include "workflow/pack_diagnosis.hpp"
 
 namespace bms {
 namespace {
@@ -18,22 +15,11 @@ namespace {
 namespace truth = benchmark::truth;
 
 diagnosis::pack::PackDiagnosis diagnosis_of(const truth::PackCase& c) {
-  measurement::Recording r;
-  r.time_s = c.recording.time_s;
-  r.current_a = c.recording.current_a;
-  for (const auto& v : c.recording.cell_v) r.cell_voltage_v.emplace_back(v);
-  for (const auto& t : c.recording.sensor_c) r.cell_temperature_c.emplace_back(t);
-  if (!c.recording.pack_v.empty()) r.pack_voltage_v = c.recording.pack_v;
-  workflow::PackOptions options;
-  options.initial_soc = c.given_initial_soc;
-  options.shared = false;
-  const auto cell = files::parse_cell(truth::cell_toml(c.cell, "pack"), "pack");
-  return workflow::diagnose_pack(cell, r, options).diagnosis;
+  return benchmark::diagnose(c, false).diagnosis;
 }
 
 benchmark::PackOutcome outcome_of(std::uint64_t seed, std::size_t index, bool healthy, std::string_view only = {}) {
-  const truth::PackCase c = truth::make_pack(seed, index, healthy, only);
-  return benchmark::score_pack(c, diagnosis_of(c));
+  return benchmark::run_pack(truth::make_pack(seed, index, healthy, only), false);
 }
 
 /// A healthy pack of 14 cells, three hours in rows of 1 s.
