@@ -100,13 +100,12 @@ void IsoTp::flow_control(const can::Frame& frame, std::uint64_t now_us) {
   }
 }
 
-bool IsoTp::send(std::span<const std::uint8_t> message, std::uint64_t now_us) {
+bool IsoTp::send(std::span<const std::uint8_t> message) {
   if (sending() || message.empty() || message.size() > longest) return false;
   std::ranges::copy(message, out_bytes_.begin());
   out_size_ = message.size();
   out_done_ = 0;
   waits_ = 0;
-  out_since_us_ = now_us;
   out_ = Out::first;
   return true;
 }

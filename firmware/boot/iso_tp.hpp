@@ -29,7 +29,7 @@ class IsoTp {
   void taken() { complete_ = false; }
 
   /// Begins to send. Returns false if another message is being sent, or if it is empty or too long.
-  bool send(std::span<const std::uint8_t> message, std::uint64_t now_us);
+  bool send(std::span<const std::uint8_t> message);
   bool sending() const { return out_ != Out::idle; }
   /// The next frame that is due now. Call it until it returns false.
   bool next_frame(can::Frame& frame, std::uint64_t now_us);

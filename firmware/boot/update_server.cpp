@@ -303,14 +303,14 @@ bool UpdateNode::next_frame(can::Frame& frame, std::uint64_t now_us) {
   if (request.empty()) return false;
   if (UpdateServer::takes_long(request) && !pending_sent_) {
     const std::array<std::uint8_t, 3> wait{negative, request[0], pending};
-    pending_sent_ = transport_.send(wait, now_us);
+    pending_sent_ = transport_.send(wait);
     return transport_.next_frame(frame, now_us);
   }
   pending_sent_ = false;
   std::array<std::uint8_t, UpdateServer::longest_answer> room{};
   const auto bytes = server_.answer(request, room, now_us);
   transport_.taken();
-  transport_.send(bytes, now_us);
+  transport_.send(bytes);
   return transport_.next_frame(frame, now_us);
 }
 

@@ -326,7 +326,7 @@ void Link::pump(int wait_ms) {
 std::optional<Bytes> Link::request(const Bytes& message, int wait_ms) {
   transport_.taken();  // of an earlier request that was given up
   auto until = Clock::now() + std::chrono::milliseconds(wait_ms);
-  transport_.send(message, now_us());
+  transport_.send(message);
   while (Clock::now() < until && !source_.ended()) {
     pump(5);
     const auto answer = transport_.message();

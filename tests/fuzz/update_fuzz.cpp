@@ -142,7 +142,7 @@ class Bench final : public UpdateSurroundings {
   }
   void exchange(const std::vector<std::uint8_t>& request) {
     IsoTp client(update_request_id, update_response_id);
-    client.send(request, now_us_);
+    client.send(request);
     can::Frame frame;
     for (int k = 0; k < 400; ++k) {
       bool any = false;

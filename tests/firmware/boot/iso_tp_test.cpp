@@ -77,8 +77,8 @@ TEST_F(IsoTpTest, ASilentSenderIsGivenUpAfterASecond) {
 
 TEST_F(IsoTpTest, SendsNoFasterThanTheReceiverAllows) {
   const std::vector<std::uint8_t> bytes(30, 7);
-  ASSERT_TRUE(side_.send(bytes, 0));
-  EXPECT_FALSE(side_.send(bytes, 0)) << "one message at a time";
+  ASSERT_TRUE(side_.send(bytes));
+  EXPECT_FALSE(side_.send(bytes)) << "one message at a time";
   EXPECT_EQ(frames().size(), 1U);
   side_.receive(frame({0x30, 2, 10}), 0);  // two frames, 10 ms apart
   EXPECT_EQ(frames(0).size(), 1U);
@@ -92,7 +92,7 @@ TEST_F(IsoTpTest, SendsNoFasterThanTheReceiverAllows) {
 }
 
 TEST_F(IsoTpTest, ARespondentThatNeverAnswersIsGivenUp) {
-  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7), 0));
+  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7)));
   frames();
   frames(1'000'001);
   EXPECT_FALSE(side_.sending());
@@ -172,7 +172,7 @@ TEST_F(IsoTpTest, TheSequenceBeginsAgainAfterFifteen) {
     side_.receive(frame({static_cast<std::uint8_t>(0x20 | (k & 15)), 0, 1, 2, 3, 4, 5, 6}), 0);
   EXPECT_EQ(message().size(), 6U + 7 * 18);
   const std::vector<std::uint8_t> bytes(6 + 7 * 18, 9);
-  ASSERT_TRUE(side_.send(bytes, 0));
+  ASSERT_TRUE(side_.send(bytes));
   frames();
   side_.receive(frame({0x30, 0, 0}), 0);
   const auto sent = frames();
@@ -192,7 +192,7 @@ TEST_F(IsoTpTest, TheSeparationTimeIsThatOfTheStandard) {
                                    {0xFA, 127'000},
                                    {0xFF, 127'000}}) {
     IsoTp side(1, 2);
-    ASSERT_TRUE(side.send(std::vector<std::uint8_t>(30, 7), 0));
+    ASSERT_TRUE(side.send(std::vector<std::uint8_t>(30, 7)));
     can::Frame f;
     ASSERT_TRUE(side.next_frame(f, 0));
     const std::uint64_t begin = 500'000;
@@ -207,7 +207,7 @@ TEST_F(IsoTpTest, TheSeparationTimeIsThatOfTheStandard) {
 TEST_F(IsoTpTest, FlowControlCountsOnlyWhereItIsWaitedFor) {
   side_.receive(frame({0x30, 0, 0}), 0);
   EXPECT_FALSE(side_.sending());
-  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7), 0));
+  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7)));
   side_.receive(frame({0x30, 0, 0}), 0);
   const auto first = frames();
   ASSERT_EQ(first.size(), 1U) << "the first frame has not been sent yet";
@@ -221,7 +221,7 @@ TEST_F(IsoTpTest, FlowControlCountsOnlyWhereItIsWaitedFor) {
 
 /// Each wait gives the receiver another second; the eleventh in a row is one too many.
 TEST_F(IsoTpTest, AReceiverMayAskToWaitTenTimes) {
-  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7), 0));
+  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(30, 7)));
   frames();
   for (unsigned k = 1; k <= 10; ++k) {
     EXPECT_TRUE(frames(k * 1'000'000).empty());
@@ -234,12 +234,12 @@ TEST_F(IsoTpTest, AReceiverMayAskToWaitTenTimes) {
 }
 
 TEST_F(IsoTpTest, LongMessagesStateTheirLengthInTwelveBits) {
-  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(0x3AB, 7), 0));
+  ASSERT_TRUE(side_.send(std::vector<std::uint8_t>(0x3AB, 7)));
   const auto first = frames();
   ASSERT_EQ(first.size(), 1U);
   EXPECT_EQ(first[0].data[0], 0x13);
   EXPECT_EQ(first[0].data[1], 0xAB);
-  EXPECT_FALSE(side_.send({}, 0));
+  EXPECT_FALSE(side_.send({}));
 }
 
 TEST(IsoTp, EveryLengthArrives) {
@@ -247,7 +247,7 @@ TEST(IsoTp, EveryLengthArrives) {
     IsoTp from(1, 2), to(2, 1);
     std::vector<std::uint8_t> bytes(size);
     for (std::size_t k = 0; k < size; ++k) bytes[k] = static_cast<std::uint8_t>(k * 7 + size);
-    ASSERT_TRUE(from.send(bytes, 0));
+    ASSERT_TRUE(from.send(bytes));
     can::Frame f;
     for (bool moved = true; moved;) {
       moved = false;
@@ -262,7 +262,7 @@ TEST(IsoTp, EveryLengthArrives) {
     }
     ASSERT_TRUE(std::ranges::equal(to.message(), bytes)) << size;
   }
-  EXPECT_FALSE(IsoTp(1, 2).send(std::vector<std::uint8_t>(IsoTp::longest + 1), 0));
+  EXPECT_FALSE(IsoTp(1, 2).send(std::vector<std::uint8_t>(IsoTp::longest + 1)));
 }
 
 }  // namespace

@@ -18,7 +18,8 @@ TEST(FlashMap, IsThatOfTheReferenceManual) {
   EXPECT_EQ(application_slots[1] + application_slot_bytes, cell_slots[0]);
   EXPECT_EQ(cell_slots[1] + cell_slot_bytes, 0x080E'0000U);
   EXPECT_EQ(loader_begin + loader_first_bytes, 0x0800'4000U) << "the stored data begin";
-  EXPECT_LE(loader_second_begin + loader_second_bytes, application_slots[0]);
+  EXPECT_EQ(loader_second_begin, 0x0801'0000U) << "sector 4";
+  EXPECT_EQ(loader_first_bytes + loader_second_bytes, 48U * 1024);
 }
 
 Start some_start() {
@@ -122,6 +123,22 @@ TEST(HandoverToTheImage, WithAnyWrongBitIsNone) {
   third.slot = 2;
   third.check = check_of(third);
   EXPECT_FALSE(start_of(third)) << "there are two slots";
+}
+
+TEST(HandoverToTheImage, OfCellConstantsKnowsBothSlotsAndThoseOfTheBuild) {
+  for (const std::uint8_t slot : {std::uint8_t{0}, std::uint8_t{1}}) {
+    Start start = some_start();
+    start.slot = slot;
+    const auto back = start_of(cell_handover_of(start, some_battery()));
+    ASSERT_TRUE(back);
+    EXPECT_TRUE(back->found);
+    EXPECT_EQ(back->slot, slot);
+  }
+  const CellHandover none = cell_handover_of(Start{}, some_battery());
+  EXPECT_EQ(none.slot, 0xFF) << "as its declaration says: applications read what older loaders write";
+  const auto back = start_of(none);
+  ASSERT_TRUE(back);
+  EXPECT_FALSE(back->found);
 }
 
 class KeysInTheLoader : public ::testing::Test {

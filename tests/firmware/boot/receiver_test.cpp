@@ -42,6 +42,21 @@ TEST_F(ReceiverTest, AcceptsAnImageOfTheProductKeyAndStartsItOnTrial) {
   EXPECT_EQ(start.header.version, 0x000300U);
 }
 
+TEST_F(ReceiverTest, AfterAnImageOfAnyLengthTheLastWordStaysErased) {
+  for (const std::uint32_t bytes : {8'997U, 8'998U, 8'999U}) {
+    Bench bench;
+    bench.produce({.version = 0x000200, .security_version = 5, .seed = 7});
+    ImageWish wish = update();
+    wish.bytes = bytes;
+    const std::string container = image(wish);
+    ASSERT_EQ(bench.transfer(container, 0), Refusal::none);
+    const auto slot = bench.flash().bytes(1);
+    EXPECT_TRUE(std::equal(container.begin(), container.end(), slot.begin(),
+                           [](char sent, std::uint8_t stored) { return static_cast<std::uint8_t>(sent) == stored; }));
+    for (std::size_t at = container.size(); at < container.size() + 8; ++at) EXPECT_EQ(slot[at], 0xFF) << bytes;
+  }
+}
+
 TEST_F(ReceiverTest, AcceptsAnImageOfTheSecondKey) {
   auto wish = update();
   wish.key = "next";
