@@ -117,6 +117,12 @@ TEST(Refusals, HaveTheirNumbersAndWords) {
   EXPECT_EQ(static_cast<int>(Refusal::bad_signature), 7);
   EXPECT_EQ(static_cast<int>(Refusal::older_security), 9);
   EXPECT_EQ(static_cast<int>(Refusal::too_large), 11);
+  for (std::size_t k = 0; k < refusal_words.size(); ++k) {
+    const auto refusal = static_cast<Refusal>(k);
+    const bool changed = refusal == Refusal::not_a_header || refusal == Refusal::header_damaged ||
+                         refusal == Refusal::bad_signature || refusal == Refusal::block_damaged;
+    EXPECT_EQ(says_damaged(refusal), changed) << words_for(refusal);
+  }
   EXPECT_EQ(static_cast<int>(Refusal::not_at_rest), 15);
   EXPECT_EQ(static_cast<int>(Refusal::erase_at_restart), 23);
   EXPECT_EQ(words_for(Refusal::trial_failed), "the image was started on trial and did not confirm itself");

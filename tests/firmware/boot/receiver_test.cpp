@@ -103,6 +103,15 @@ TEST_F(ReceiverTest, RefusesEachBadHeaderForItsOwnReasonBeforeAWordIsWritten) {
 }
 
 /// A leaked development key makes no product's image, not even for a battery that runs development images.
+/// The loader reads the header of a slot again at each start, so its length must not reach beyond the slot.
+TEST_F(ReceiverTest, AHeaderThatReachesBeyondTheSlotIsTooLargeWhoeverSignedIt) {
+  Header header = payload_of(update()).header;
+  header.payload_bytes = bench_.battery().slot_bytes - header_bytes;
+  EXPECT_EQ(check_fields(header, bench_.battery(), 1), Refusal::none);
+  ++header.payload_bytes;
+  EXPECT_EQ(check_fields(header, bench_.battery(), 1), Refusal::too_large);
+}
+
 TEST_F(ReceiverTest, OfADevelopmentKeyOnlyDevelopmentImagesAreAccepted) {
   bench_.battery().product = false;
   auto wish = update();
