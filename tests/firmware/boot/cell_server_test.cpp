@@ -92,6 +92,15 @@ class CellServerTest : public ::testing::Test {
   BatteryWithCells battery_;
 };
 
+TEST_F(CellServerTest, TheirStateIsThatOfTheHeaderFile) {
+  battery_.start(true);
+  update::Link link(battery_);
+  EXPECT_EQ(
+      link.request({0x22, 0xF1, 0xA2}).value_or(Bytes{}),
+      (Bytes{0x62, 0xF1, 0xA2, 0xFF, 0, 0, 0, 0, 0, 0, 0x11, 0x11, 0x11, 0x11, 0x11, 0x11, 0x11, 0x11, 0, 0, 0, 0, 0}))
+      << "the constants of the build act";
+}
+
 TEST_F(CellServerTest, ConstantsAloneAreSentStartedAndConfirmed) {
   const auto result = run(wish());
   EXPECT_EQ(result.outcome, Outcome::done) << result.reason;

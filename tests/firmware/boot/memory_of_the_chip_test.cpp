@@ -133,6 +133,7 @@ TEST(HandoverToTheImage, OfCellConstantsKnowsBothSlotsAndThoseOfTheBuild) {
     ASSERT_TRUE(back);
     EXPECT_TRUE(back->found);
     EXPECT_EQ(back->slot, slot);
+    EXPECT_EQ(back->refusal, Refusal::bad_signature);
   }
   const CellHandover none = cell_handover_of(Start{}, some_battery());
   EXPECT_EQ(none.slot, 0xFF) << "as its declaration says: applications read what older loaders write";
