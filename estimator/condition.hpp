@@ -72,6 +72,11 @@ class Condition {
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
   constexpr Health<S> capacity() const { return capacity_.health(); }
   constexpr Health<S> resistance() const { return resistance_.health(); }
+  /// Capacity and resistance of an earlier run, before the first sample.
+  constexpr void restore(const Health<S>& capacity, const Health<S>& resistance) {
+    capacity_.restore(capacity);
+    resistance_.restore(resistance);
+  }
 
  private:
   static constexpr std::uint32_t limits_every_us = 1'000'000, longest_step_us = 60'000'000;

@@ -60,6 +60,11 @@ class CapacityHealth {
   }
 
   constexpr Health<S> health() const { return {ratio_, arithmetic::root<Soc>(variance_)}; }
+  /// Goes on with what an earlier run has found, between two visits.
+  constexpr void restore(const Health<S>& found) {
+    ratio_ = found.ratio;
+    variance_ = Variance(found.sigma * found.sigma);
+  }
 
  private:
   struct Visit {
@@ -143,6 +148,11 @@ class ResistanceHealth {
 
   constexpr Health<S> health() const {
     return {arithmetic::Factor<S>(arithmetic::Factor<S>(1) + more_), arithmetic::root<Soc>(variance_)};
+  }
+  /// Goes on with what an earlier run has found.
+  constexpr void restore(const Health<S>& found) {
+    more_ = arithmetic::Factor<S>(found.ratio - arithmetic::Factor<S>(1));
+    variance_ = Variance(found.sigma * found.sigma);
   }
 
  private:

@@ -93,6 +93,21 @@ TYPED_TEST(HealthOfEveryScalar, WhoHasSeenNothingKnowsNothing) {
   EXPECT_NEAR(arithmetic::as_double(resistance.sigma), 0.3, 1e-6);
 }
 
+TYPED_TEST(HealthOfEveryScalar, GoesOnWithWhatAnEarlierRunHasFound) {
+  const Day<TypeParam> day(6 * 0.8, 0.3 * 0.0133, 4);
+  CapacityHealth<TypeParam> capacity;
+  ResistanceHealth<TypeParam> resistance;
+  capacity.restore(day.capacity.health());
+  resistance.restore(day.resistance.health());
+  const auto same = [](const Health<TypeParam>& after, const Health<TypeParam>& before) {
+    EXPECT_NEAR(arithmetic::as_double(after.ratio), arithmetic::as_double(before.ratio), 1e-6);
+    EXPECT_NEAR(arithmetic::as_double(after.sigma), arithmetic::as_double(before.sigma), 1e-5);
+  };
+  same(capacity.health(), day.capacity.health());
+  same(resistance.health(), day.resistance.health());
+  EXPECT_GT(arithmetic::as_double(capacity.health().sigma), 0) << "a later visit still counts";
+}
+
 TYPED_TEST(HealthOfEveryScalar, HalfAPlateauIsNoCapacity) {
   CapacityHealth<TypeParam> capacity;
   using namespace model;
