@@ -38,7 +38,7 @@ def layout(signal):
     invalid = (signal.attributes.get("Invalid") or "").strip('"')
     if invalid and int(invalid) >= 1 << 31:
         invalid = str(int(invalid) - (1 << 32))
-    floats = [number(value) + "F" for value in (signal.factor, signal.offset, signal.min, signal.max)]
+    floats = [number(value) + "F" for value in (signal.factor, 0 - signal.offset, signal.min, signal.max)]
     words = [signal.start_bit, signal.size, str(signal.is_signed).lower(), *floats, str(invalid != "").lower(),
              invalid or 0]
     return "{" + ", ".join(str(word) for word in words) + "}"

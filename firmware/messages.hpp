@@ -33,7 +33,7 @@ constexpr float percent(const T& fraction) {
 template <class Estimate>
 constexpr bool is_number(const Estimate& e) {
   const float sum = number(e.soc) + number(e.soc_sigma);
-  return sum - sum == 0 && number(e.soc_sigma) > 0;
+  return sum * 0 == 0 && number(e.soc_sigma) > 0;  // not so for infinity
 }
 
 /// Converts to units of 1e-9. Clamped to -2..2; not-a-number becomes 0.

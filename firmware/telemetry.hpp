@@ -60,7 +60,8 @@ class Telemetry {
     published_alarming_ = now.board.alarming();
     publish_truck(now.board);
     if (now.stored_part) [[unlikely]]
-      stored_data_.send(*now.stored_part, now.persistence, static_cast<std::uint32_t>(now.capacity_ah * 1e6F));
+      stored_data_.send(*now.stored_part, now.persistence,
+                        static_cast<std::uint32_t>(static_cast<std::int32_t>(now.capacity_ah * 1e6F)));
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));

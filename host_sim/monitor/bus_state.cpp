@@ -44,7 +44,8 @@ double invalid_raw(const can::SignalLayout& layout) {
 
 double raw_of(const SignalInfo& signal, double value) {
   if (signal.raw) return value;
-  return std::round((value - static_cast<double>(signal.layout.offset)) / static_cast<double>(signal.layout.factor));
+  return std::round((value + static_cast<double>(signal.layout.minus_offset)) /
+                    static_cast<double>(signal.layout.factor));
 }
 
 /// The decimal value of a signal: 54.302, not the product of two floats. A float holds a raw value of up to 24 bits
@@ -83,7 +84,7 @@ MessageInfo info_of() {
                    }};
   Message message;
   message.each([&](const char* name, const char* unit, const auto& value, const can::SignalLayout& layout) {
-    const double factor = decimal(layout.factor), offset = decimal(layout.offset);
+    const double factor = decimal(layout.factor), offset = -decimal(layout.minus_offset);
     const bool integral = std::is_integral_v<std::remove_cvref_t<decltype(value)>>,
                unscaled = factor == 1 && offset == 0;
     info.signals.push_back(

@@ -898,13 +898,13 @@ struct Temperatures {
   static constexpr std::uint16_t id = 0x195;
   static constexpr std::uint32_t cycle_us = 1000000;  ///< 0: not cyclic
   static constexpr std::uint16_t data_id = 405;
-  static constexpr SignalLayout temperature1_layout = {12, 12, false, 0.1F, -60.0F, -60.0F, 349.4F, true, 4095};
+  static constexpr SignalLayout temperature1_layout = {12, 12, false, 0.1F, 60.0F, -60.0F, 349.4F, true, 4095};
   float temperature1 = unknown;  ///< [degC] Temperature of this sensor. Not known if the sensor does not exist.
-  static constexpr SignalLayout temperature2_layout = {24, 12, false, 0.1F, -60.0F, -60.0F, 349.4F, true, 4095};
+  static constexpr SignalLayout temperature2_layout = {24, 12, false, 0.1F, 60.0F, -60.0F, 349.4F, true, 4095};
   float temperature2 = unknown;  ///< [degC] Temperature of this sensor. Not known if the sensor does not exist.
-  static constexpr SignalLayout temperature3_layout = {36, 12, false, 0.1F, -60.0F, -60.0F, 349.4F, true, 4095};
+  static constexpr SignalLayout temperature3_layout = {36, 12, false, 0.1F, 60.0F, -60.0F, 349.4F, true, 4095};
   float temperature3 = unknown;  ///< [degC] Temperature of this sensor. Not known if the sensor does not exist.
-  static constexpr SignalLayout temperature4_layout = {48, 12, false, 0.1F, -60.0F, -60.0F, 349.4F, true, 4095};
+  static constexpr SignalLayout temperature4_layout = {48, 12, false, 0.1F, 60.0F, -60.0F, 349.4F, true, 4095};
   float temperature4 = unknown;  ///< [degC] Temperature of this sensor. Not known if the sensor does not exist.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
@@ -1977,7 +1977,7 @@ struct FrontEnd {
   std::uint32_t permanent_failure = 0;  ///< The chip reports a permanent failure.
   static constexpr SignalLayout pins_wrong_layout = {24, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t pins_wrong = 0;  ///< The enable signals do not follow the protections.
-  static constexpr SignalLayout die_temperature_layout = {25, 7, false, 2.0F, -62.0F, -60.0F, 192.0F, true, 0};
+  static constexpr SignalLayout die_temperature_layout = {25, 7, false, 2.0F, 62.0F, -60.0F, 192.0F, true, 0};
   float die_temperature = unknown;  ///< [degC] Temperature of the measuring chip itself, of two chips that of the warmer one.
   static constexpr SignalLayout lost_layout = {32, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
   std::uint32_t lost = 0;  ///< Number of times that measuring ended since the start.
@@ -2348,9 +2348,9 @@ struct StoredFaultPack {
   float soc = unknown;  ///< [%] State of charge.
   static constexpr SignalLayout current_layout = {24, 14, true, 0.25F, 0.0F, -2047.75F, 2047.75F, true, -8192};
   float current = unknown;  ///< [A] Positive: charging.
-  static constexpr SignalLayout highest_temperature_layout = {38, 8, false, 1.0F, -60.0F, -60.0F, 194.0F, true, 255};
+  static constexpr SignalLayout highest_temperature_layout = {38, 8, false, 1.0F, 60.0F, -60.0F, 194.0F, true, 255};
   float highest_temperature = unknown;  ///< [degC] Of the temperature sensors.
-  static constexpr SignalLayout lowest_temperature_layout = {46, 8, false, 1.0F, -60.0F, -60.0F, 194.0F, true, 255};
+  static constexpr SignalLayout lowest_temperature_layout = {46, 8, false, 1.0F, 60.0F, -60.0F, 194.0F, true, 255};
   float lowest_temperature = unknown;  ///< [degC] Of the temperature sensors.
   static constexpr SignalLayout number_layout = {54, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
   std::uint32_t number = 0;  ///< Number of the fault since the first start, low 8 bits. Frames with the same number belong together.
@@ -2536,7 +2536,7 @@ struct StoredExtremes {
   static constexpr std::uint32_t kind_highest = 1;
   static constexpr SignalLayout voltage_layout = {16, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
   float voltage = unknown;  ///< [V] Of any cell.
-  static constexpr SignalLayout temperature_layout = {29, 8, false, 1.0F, -60.0F, -60.0F, 194.0F, true, 255};
+  static constexpr SignalLayout temperature_layout = {29, 8, false, 1.0F, 60.0F, -60.0F, 194.0F, true, 255};
   float temperature = unknown;  ///< [degC] Of any temperature sensor.
   static constexpr SignalLayout current_layout = {37, 14, true, 0.25F, 0.0F, -2047.75F, 2047.75F, true, -8192};
   float current = unknown;  ///< [A] Of the pack. Lowest: the largest discharge current.

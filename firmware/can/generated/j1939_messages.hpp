@@ -22,7 +22,7 @@ struct DcSourceStatus1 {
   std::uint32_t device_priority = 0;  ///< 120: the source knows its state of charge.
   static constexpr SignalLayout voltage_layout = {16, 16, false, 0.05F, 0.0F, 0.0F, 3276.6F, true, 65535};
   float voltage = unknown;  ///< [V] Pack voltage.
-  static constexpr SignalLayout current_layout = {32, 32, false, 0.001F, -2000000.0F, -2000000.0F, 2294967.294F, true, -1};
+  static constexpr SignalLayout current_layout = {32, 32, false, 0.001F, 2000000.0F, -2000000.0F, 2294967.294F, true, -1};
   std::uint32_t current = 0;  ///< [A] Positive: discharging. The sign is opposite to that of the battery's own messages.
 
   constexpr can::Frame frame() const {
@@ -68,7 +68,7 @@ struct DcSourceStatus2 {
   std::uint32_t instance = 0;  ///< Instance of the battery on the bus: 1.
   static constexpr SignalLayout device_priority_layout = {8, 8, false, 1.0F, 0.0F, 0.0F, 250.0F, false, 0};
   std::uint32_t device_priority = 0;  ///< 120: the source knows its state of charge.
-  static constexpr SignalLayout source_temperature_layout = {16, 16, false, 0.03125F, -273.0F, -273.0F, 1774.90625F, true, 65535};
+  static constexpr SignalLayout source_temperature_layout = {16, 16, false, 0.03125F, 273.0F, -273.0F, 1774.90625F, true, 65535};
   float source_temperature = unknown;  ///< [degC] Temperature of the first sensor.
   static constexpr SignalLayout state_of_charge_layout = {32, 8, false, 0.5F, 0.0F, 0.0F, 125.0F, true, 255};
   float state_of_charge = unknown;  ///< [%] State of charge for a display.
@@ -170,7 +170,7 @@ struct DcSourceStatus4 {
   static constexpr std::uint32_t desired_charge_state_constant_voltage_or_current = 7;
   static constexpr SignalLayout desired_voltage_layout = {24, 16, false, 0.05F, 0.0F, 0.0F, 3276.6F, true, 65535};
   float desired_voltage = unknown;  ///< [V] Maximum: upper voltage limit of a cell times the number of cells.
-  static constexpr SignalLayout desired_current_layout = {40, 16, false, 0.05F, -1600.0F, 0.0F, 1676.6F, true, 65535};
+  static constexpr SignalLayout desired_current_layout = {40, 16, false, 0.05F, 1600.0F, 0.0F, 1676.6F, true, 65535};
   float desired_current = unknown;  ///< [A] Maximum: AllowedCurrent.Charge.
   static constexpr SignalLayout battery_type_layout = {56, 4, false, 1.0F, 0.0F, 0.0F, 15.0F, false, 0};
   std::uint32_t battery_type = 0;  ///< Cell chemistry.

@@ -57,7 +57,7 @@ std::string set(const char* name, std::int32_t& value, const can::SignalLayout& 
   value = static_cast<std::int32_t>(chance());
   const double sent = std::clamp(value, -most - 1, most);
   const bool known = !s.has_invalid || value != static_cast<std::int32_t>(s.invalid);
-  return entry(name, known, fmt::format("{}", sent * decimal(s.factor) + static_cast<double>(s.offset)));
+  return entry(name, known, fmt::format("{}", sent * decimal(s.factor) - static_cast<double>(s.minus_offset)));
 }
 std::string set(const char* name, std::uint32_t& value, const can::SignalLayout& s, Kind kind) {
   const auto most = s.bits > 24 ? static_cast<std::uint32_t>(can::mask(s.bits)) : static_cast<std::uint32_t>(s.highest);
@@ -70,7 +70,7 @@ std::string set(const char* name, std::uint32_t& value, const can::SignalLayout&
   const bool known = !s.has_invalid || (value <= most && value != static_cast<std::uint32_t>(s.invalid));
   if (s.bits <= 24) return entry(name, known, fmt::format("{}", std::min(value, most)));
   return entry(name, known,
-               fmt::format("{}", static_cast<double>(value) * decimal(s.factor) + static_cast<double>(s.offset)));
+               fmt::format("{}", static_cast<double>(value) * decimal(s.factor) - static_cast<double>(s.minus_offset)));
 }
 
 template <class Message>
