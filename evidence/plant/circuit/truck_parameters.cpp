@@ -86,8 +86,10 @@ TruckParameters random_world(std::uint64_t seed, const WorldLimits& limits) {
   world.dc_link.capacitance_f = draw.within(world.dc_link.capacitance_f, 0.2);
   world.dc_link.esr_ohm = draw.between(0.005, 0.020);
   if (draw.chance(0.7)) world.dc_link.bleeder_ohm = draw.decades(1e3, 1e5);
-  const double share = share_of(limits.cells);  // through the same resistor: the power by its square
-  world.dc_link.idle_w = draw.chance(0.5) ? share * share * draw.between(0, 5) : 0;
+  const double share = share_of(limits.cells);
+  // Through the same resistor: the power by the square of a lower voltage. A higher one allows no more, because the
+  // contactor and its loop decide how far the DC link may be below the pack.
+  world.dc_link.idle_w = draw.chance(0.5) ? std::min(1.0, share * share) * draw.between(0, 5) : 0;
   world.dc_link.idle_from_v = share * draw.between(9, 36);
   world.dc_link.start_v = CellString(world.cells).emf_v() * draw.between(0, 1);
   world.charger.idle_v = draw.chance(0.3) ? share * draw.between(20, 60) : 0;

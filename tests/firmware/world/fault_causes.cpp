@@ -9,7 +9,9 @@ namespace {
 
 constexpr std::uint64_t fault(unsigned bit) { return std::uint64_t{1} << bit; }
 constexpr std::uint64_t limits = fault(38) | fault(39) | fault(40);  ///< the reading is far above them
-constexpr std::uint64_t second_line = fault(32) | fault(28);         ///< its trip opens main plus
+constexpr std::uint64_t limits_of_cells = fault(0) | fault(1) | fault(2) | fault(3) | fault(4) | fault(5) | fault(16) |
+                                          fault(17) | fault(20) | fault(21) | fault(25);
+constexpr std::uint64_t second_line = fault(32) | fault(28);  ///< its trip opens main plus
 
 }  // namespace
 
@@ -19,7 +21,8 @@ SetQuantity actuator_of(const Row& row) {
   if (q == "lowest cell") return [](TruckWorld& w, double v) { w.hold_cell(4, v); };
   if (q == "pack") {
     return [](TruckWorld& w, double v) {
-      for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, v / 16);
+      const std::size_t cells = w.truck.cell_count();
+      for (std::size_t k = 0; k < cells; ++k) w.hold_cell(k, v / static_cast<double>(cells));
     };
   }
   if (q == "warmest sensor") return [](TruckWorld& w, double c) { w.set_temperature(2, c); };
@@ -29,7 +32,8 @@ SetQuantity actuator_of(const Row& row) {
   if (q == "highest minus lowest cell") {
     return [](TruckWorld& w, double v) {
       double highest_v = 0;
-      for (std::size_t k = 0; k < 16; ++k) highest_v = k == 3 ? highest_v : std::max(highest_v, w.truck.cell_v(k));
+      for (std::size_t k = 0; k < w.truck.cell_count(); ++k)
+        highest_v = k == 3 ? highest_v : std::max(highest_v, w.truck.cell_v(k));
       w.hold_cell(3, highest_v - v);
     };
   }
@@ -44,7 +48,41 @@ SetQuantity actuator_of(const Row& row) {
 
 namespace {
 
-void add_front_end_causes(std::vector<Cause>& list) {
+/// Of each of two chips, of the isolator between them, and of both at once.
+void add_half_causes(std::vector<Cause>& list) {
+  // voltage missing; with the lower chip the current, with each its temperatures
+  const std::uint64_t half = fault(20) | fault(21) | fault(22) | fault(23) | second_line | fault(33);
+  const auto add = [&](unsigned bit, const char* name, std::function<void(TruckWorld&)> happens,
+                       double within_s = 0.7) {
+    list.push_back({bit, name, std::move(happens), within_s, true, half});
+  };
+  add(20, "lower chip does not answer", [](TruckWorld& w) { w.chip.gone = true; });
+  add(20, "lower chip holds its clock low", [](TruckWorld& w) { w.chip.hung = true; });
+  add(20, "lower chip stops measuring", [](TruckWorld& w) { w.chip.frozen = true; });
+  add(
+      32, "lower chip resets", [](TruckWorld& w) { w.chip.reset(); }, 2);
+  add(20, "strap of the lower chip broken", [](TruckWorld& w) { w.sensors.lower_strap_broken = true; });
+  add(20, "isolator without supply", [](TruckWorld& w) { w.isolator_supplied = false; });
+  add(20, "upper chip holds its clock low", [](TruckWorld& w) { w.upper_chip.hung = true; });
+  add(20, "upper chip stops measuring", [](TruckWorld& w) { w.upper_chip.frozen = true; });
+  add(
+      32, "upper chip resets", [](TruckWorld& w) { w.upper_chip.reset(); }, 2);
+  add(20, "strap of the upper chip broken", [](TruckWorld& w) { w.sensors.upper_strap_broken = true; });
+  add(29, "both chips hold their clocks low", [](TruckWorld& w) { w.chip.hung = w.upper_chip.hung = true; });
+  add(29, "both chips stop measuring", [](TruckWorld& w) { w.chip.frozen = w.upper_chip.frozen = true; });
+  for (std::size_t k = 0; k + 1 < list.size(); ++k) list[k].also &= ~fault(list[k].bit);
+  list.push_back({48, "die of the upper chip hot", [](TruckWorld& w) { w.upper_die_c = 97; }, 0.45});
+  list.push_back({16, "wire between the halves open",
+                  [](TruckWorld& w) {
+                    w.sensors.cell_error_v[11] = -0.6;
+                    w.sensors.cell_error_v[12] = 0.6;
+                  },
+                  0.45, false, limits_of_cells});
+  list.push_back({19, "a cell register of the upper chip reads 0",
+                  [](TruckWorld& w) { w.upper_chip.zero_cells = 1U << 6; }, 0.3, true, limits_of_cells | second_line});
+}
+
+void add_chip_causes(std::vector<Cause>& list) {
   list.push_back({29, "I2C: front end does not answer", [](TruckWorld& w) { w.chip.gone = true; }, 0.5, true,
                   fault(20) | fault(22) | fault(23) | second_line});
   list.push_back({29, "I2C: clock held low", [](TruckWorld& w) { w.chip.hung = true; }, 0.7, true,
@@ -55,6 +93,9 @@ void add_front_end_causes(std::vector<Cause>& list) {
   // report its registers may keep old values, so there is no sample.
   list.push_back({29, "front end stops measuring", [](TruckWorld& w) { w.chip.frozen = true; }, 0.7, true,
                   fault(20) | fault(22) | fault(23) | fault(21) | second_line});
+}
+
+void add_front_end_causes(std::vector<Cause>& list) {
   // 0 V is a valid code: the stack, measured by itself, contradicts it
   list.push_back(
       {19, "a cell register reads 0", [](TruckWorld& w) { w.chip.zero_cells = 1U << 6; }, 0.3, true,
@@ -64,7 +105,7 @@ void add_front_end_causes(std::vector<Cause>& list) {
                   [](TruckWorld& w) {
                     static int seconds = 0;  // others that return each second would look like noise
                     const double v = 3.30 + 0.02 * std::min(seconds++, 4);
-                    for (std::size_t k = 0; k < 16; ++k) w.hold_cell(k, v);
+                    for (std::size_t k = 0; k < w.truck.cell_count(); ++k) w.hold_cell(k, v);
                   }});
   // the converter saturates at the end of its range, which is a large current
   list.push_back({10,
@@ -105,8 +146,12 @@ void add_temperature_causes(std::vector<Cause>& list) {
 
 }  // namespace
 
-std::vector<Cause> other_causes() {
+std::vector<Cause> other_causes(std::size_t cells) {
   std::vector<Cause> list;
+  if (cells > 16)
+    add_half_causes(list);
+  else
+    add_chip_causes(list);
   add_front_end_causes(list);
   add_temperature_causes(list);
   list.push_back({34,
@@ -123,7 +168,11 @@ std::vector<Cause> other_causes() {
   list.push_back({45, "crash", [](TruckWorld& w) { w.crashed = true; }, 0.3});
   list.push_back({36,
                   "current flows after the request has ended",
-                  [](TruckWorld& w) { w.vehicle.request = Request::none; },
+                  [](TruckWorld& w) {
+                    // the charger's own current ends with its contactor
+                    if (w.closed(plant::Relay::charge)) set_drive_a(w, -1);
+                    w.vehicle.request = Request::none;
+                  },
                   0.4,
                   false,
                   0,

@@ -30,7 +30,8 @@ struct Cause {
   bool needs_current = false;   ///< has no effect while no current flows
   bool no_temperature = false;  ///< of any sensor: temperature lost then forbids charging
 };
-std::vector<Cause> other_causes();
+/// Of a pack of so many cells: more than 16 have two chips.
+std::vector<Cause> other_causes(std::size_t cells);
 
 /// A fault that is there before, while another one is caused.
 struct Background {

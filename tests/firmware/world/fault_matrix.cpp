@@ -346,9 +346,9 @@ std::string table_of(const std::vector<Row>& rows, const std::vector<Outcome>& o
 }  // namespace
 
 Result run_fault_matrix(const Extent& extent) {
-  const Pack pack = pack_of(printed_ah);
-  const std::vector<Row> rows = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md");
-  const std::vector<Cause> causes = other_causes();
+  const Pack pack = pack_of(printed_ah, extent.cells);
+  const std::vector<Row> rows = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", 1, pack.cells);
+  const std::vector<Cause> causes = other_causes(pack.cells);
   const std::vector<Background> background = backgrounds();
   Cases cases(extent.at_once);
   extent.set(cases, "faults", pack);
@@ -378,7 +378,7 @@ Result run_fault_matrix(const Extent& extent) {
       cases.start(name, [&](Outcome& outcome) { FaultCase(world, rows, pack, c, outcome).run(); });
     }
   }
-  Result result{"fault matrix", "", cases.finish()};
+  Result result{extent.named("fault matrix"), "", cases.finish()};
   if (!cases.kept.empty()) result.outcomes = cases.all_kept();
   result.table = table_of(rows, result.outcomes);
   result.outcomes.insert(result.outcomes.end(), broken.begin(), broken.end());

@@ -28,7 +28,8 @@ class Days {
       : pack_(pack),
         setup_(random_setup(pack, seed)),
         world_(pack.image, setup_),
-        judge_(world_, promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah),
+        judge_(world_,
+               promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah, pack.cells),
                pack.limit_a),
         random_(seed + 11),
         outcome_(outcome) {
@@ -332,7 +333,7 @@ std::string table_of(const Result& result) {
 }  // namespace
 
 Result run_month(const Extent& extent) {
-  const Pack pack = pack_of(truck_ah);
+  const Pack pack = pack_of(truck_ah, extent.cells);
   Cases cases(extent.at_once);
   extent.set(cases, fmt::format("month_{}", extent.days), pack);
   const std::size_t trucks = extent.count == 0 ? 20 : extent.count;
@@ -341,7 +342,7 @@ Result run_month(const Extent& extent) {
     cases.start(fmt::format("truck {}", seed),
                 [&, seed](Outcome& outcome) { Days(pack, seed, outcome).run(extent.days); });
   }
-  Result result{"month", "", cases.finish()};
+  Result result{extent.named("month"), "", cases.finish()};
   result.table = table_of(result);
   return result;
 }

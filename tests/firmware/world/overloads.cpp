@@ -62,7 +62,7 @@ Result run_overloads(const Extent& extent) {
   for (const double capacity_ah : {40.0, 100.0, 200.0}) {
     Pack pack;
     try {
-      pack = pack_of(capacity_ah);
+      pack = pack_of(capacity_ah, extent.cells);
       extent.set(cases, "overloads", pack);
       WorldSetup setup = typical_setup(pack, extent.seed);
       setup.truck.dc_link.lockout_v = 2;  // a short circuit, not a drive that gives up
@@ -84,7 +84,7 @@ Result run_overloads(const Extent& extent) {
       fmt::print("FAILED {}: {}\n", broken.back().name, broken.back().why);
     }
   }
-  Result result{"overloads", "", cases.finish()};
+  Result result{extent.named("overloads"), "", cases.finish()};
   result.table =
       "| pack and current | largest current [A] | contacts open after [s] | allowed [s] | published | "
       "|\n|---|---|---|---|---|---|\n";

@@ -50,14 +50,28 @@ Row row_of(const std::vector<std::string>& c) {
   return row;
 }
 
+constexpr double printed_cells = 16;         ///< of the table
+constexpr double stack_error_v = 0.2;        ///< of the stack's own measurement, with any number of cells
 constexpr double overload_from = 1.05;       ///< of the continuous limit, as the table says
 constexpr double rest_current_share = 0.02;  ///< rest current at 1C
+
+/// Thresholds of the pack, for another number of cells than the table's.
+void fit_to_cells(Row& row, double factor) {
+  if (row.quantity == "pack") {
+    row.threshold *= factor;
+    row.release_threshold *= factor;
+  }
+  if (row.quantity == "sum of cells minus pack") {
+    row.threshold = stack_error_v + (row.threshold - stack_error_v) * factor;
+    row.release_threshold = stack_error_v + (row.release_threshold - stack_error_v) * factor;
+  }
+}
 
 bool begins(const std::string& text, const char* with) { return text.rfind(with, 0) == 0; }
 
 }  // namespace
 
-std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor) {
+std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor, std::size_t cells) {
   std::ifstream file(readme);
   std::vector<Row> rows;
   bool inside = false;
@@ -70,6 +84,7 @@ std::vector<Row> promised_rows(const std::filesystem::path& readme, double curre
     rows.push_back(row_of(c));
     const bool current = rows.back().quantity == "magnitude of the current";
     if (current) rows.back().threshold *= current_factor;
+    fit_to_cells(rows.back(), static_cast<double>(cells) / printed_cells);
   }
   if (rows.empty()) throw std::runtime_error(fmt::format("{} has no table of protections", readme.string()));
   return rows;
@@ -112,13 +127,13 @@ double Judge::value(const Row& row) const {
   }
   if (q == "opposite shift of neighbours") {
     double shift_v = 0;
-    for (std::size_t k = 0; k + 1 < 16; ++k) {
+    for (std::size_t k = 0; k + 1 < world_.truck.cell_count(); ++k) {
       if (s.cell_error_v[k] * s.cell_error_v[k + 1] >= 0) continue;
       shift_v = std::max(shift_v, std::min(std::abs(s.cell_error_v[k]), std::abs(s.cell_error_v[k + 1])));
     }
     return shift_v;
   }
-  if (q == "die of the measuring chip") return world_.die_c;
+  if (q == "die of the measuring chip") return std::max(world_.die_c, world_.upper_die_c);
   const bool warmest = q == "warmest sensor";
   if (!warmest && q != "coldest sensor") return std::nan("");
   double c = std::nan("");

@@ -34,9 +34,9 @@ struct Row {
   Reaction reaction = Reaction::warn;
 };
 
-/// Thresholds of currents are multiplied by `current_factor`. Throws std::runtime_error if the file has no such table,
-/// or a row cannot be read.
-std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor = 1);
+/// Thresholds of currents are multiplied by `current_factor`; those of the pack, printed for 16 cells, follow `cells`.
+/// Throws std::runtime_error if the file has no such table, or a row cannot be read.
+std::vector<Row> promised_rows(const std::filesystem::path& readme, double current_factor = 1, std::size_t cells = 16);
 
 /// Time of the measuring chain: a scan of the front end, a sample period, processing and the bus.
 inline constexpr double chain_s = 0.45;

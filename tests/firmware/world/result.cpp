@@ -14,6 +14,10 @@ unsigned Result::failed() const {
       std::count_if(outcomes.begin(), outcomes.end(), [](const Outcome& o) { return !o.good; }));
 }
 
+std::string Extent::named(const std::string& scenario) const {
+  return cells == Extent{}.cells ? scenario : fmt::format("{} of {} cells", scenario, cells);
+}
+
 bool Extent::has(const std::string& name) const {
   std::istringstream texts(only);
   for (std::string text; std::getline(texts, text, '|');) {

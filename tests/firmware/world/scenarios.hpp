@@ -24,7 +24,7 @@ struct Extent {
   std::string only;        ///< cases whose name contains one of these texts, separated by |; empty: all
   double minutes = 10;     ///< of the shift
   std::size_t days = 30;   ///< of the month
-  std::size_t cells = 16;  ///< in series, for the starts
+  std::size_t cells = 16;  ///< in series
   unsigned at_once = 2;
   bool continues = false;     ///< good outcomes of an earlier run with the same image and seed count
   bool only_kept = false;     ///< runs nothing: the table of the outcomes that are known
@@ -33,7 +33,8 @@ struct Extent {
   double within_minutes = 0;  ///< starts no case later; 0: at any time
   /// Gives the cases of a scenario their folder and their part.
   void set(Cases& cases, const std::string& scenario, const Pack& pack) const;
-  bool has(const std::string& name) const;  ///< `only` selects the case
+  std::string named(const std::string& scenario) const;  ///< of its table, which names another number of cells than 16
+  bool has(const std::string& name) const;               ///< `only` selects the case
 };
 
 Result run_starts(const Extent& extent);            ///< key on, drive, recuperate, charge, key off, restart

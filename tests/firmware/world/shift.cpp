@@ -18,7 +18,8 @@ class Shift {
   Shift(const Pack& pack, std::uint64_t seed, Outcome& outcome)
       : pack_(pack),
         world_(pack.image, random_setup(pack, seed)),
-        judge_(world_, promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah),
+        judge_(world_,
+               promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah, pack.cells),
                pack.limit_a),
         random_(seed + 7),
         outcome_(outcome) {
@@ -52,8 +53,9 @@ class Shift {
   double between(double least, double most) { return least + random_.uniform() * (most - least); }
   double mean_soc() {
     double soc = 0;
-    for (std::size_t k = 0; k < 16; ++k) soc += world_.truck.cells().soc(k) / 16;
-    return soc;
+    const std::size_t cells = world_.truck.cell_count();
+    for (std::size_t k = 0; k < cells; ++k) soc += world_.truck.cells().soc(k);
+    return soc / static_cast<double>(cells);
   }
 
   bool start(Operating state) {
@@ -107,7 +109,7 @@ class Shift {
 }  // namespace
 
 Result run_shift(const Extent& extent) {
-  const Pack pack = pack_of(truck_ah);
+  const Pack pack = pack_of(truck_ah, extent.cells);
   Cases cases(extent.at_once);
   const std::size_t trucks = extent.count == 0 ? extent.at_once : extent.count;
   const double minutes = extent.minutes / static_cast<double>(trucks);
@@ -117,7 +119,7 @@ Result run_shift(const Extent& extent) {
     cases.start(fmt::format("truck {}", seed),
                 [&, seed](Outcome& outcome) { Shift(pack, seed, outcome).run(minutes); });
   }
-  Result result{"shift", "", cases.finish()};
+  Result result{extent.named("shift"), "", cases.finish()};
   double samples = 0, starts = 0, done = 0, soc_error = 0, shortest = 1e9, longest = 0;
   for (const Outcome& o : result.outcomes) {
     samples += o.value("samples", 0);

@@ -107,8 +107,7 @@ Result run_starts(const Extent& extent) {
     const std::uint64_t seed = extent.seed + k;
     cases.start(fmt::format("world {}", seed), [&, seed](Outcome& outcome) { Start(pack, seed, outcome).run(); });
   }
-  const bool usual = extent.cells == Extent{}.cells;
-  Result result{usual ? "starts" : fmt::format("starts of {} cells", extent.cells), "", cases.finish()};
+  Result result{extent.named("starts"), "", cases.finish()};
   result.table = "| what | worlds | soonest [s] | latest [s] |\n|---|---|---|---|\n";
   for (const char* what : {"key on", "charge", "restart", "restart at once"}) {
     std::vector<double> s;

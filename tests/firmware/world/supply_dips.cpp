@@ -160,7 +160,7 @@ std::size_t good_in(const std::vector<Outcome>& outcomes, std::uint64_t seed) {
 }  // namespace
 
 Result run_supply_dips(const Extent& extent) {
-  const Pack pack = pack_of(truck_ah);
+  const Pack pack = pack_of(truck_ah, extent.cells);
   const std::size_t count = extent.count == 0 ? 1'000 : extent.count, worlds = std::max<std::size_t>(1, count / 50);
   Cases cases(extent.at_once);
   extent.set(cases, fmt::format("dips_{}", count / worlds), pack);
@@ -178,7 +178,7 @@ Result run_supply_dips(const Extent& extent) {
     broken.back().fail(problem);
     fmt::print("FAILED {}: {}\n", broken.back().name, problem);
   }
-  Result result{"supply dips", "", cases.finish()};
+  Result result{extent.named("supply dips"), "", cases.finish()};
   if (!cases.kept.empty()) result.outcomes = cases.all_kept();
   struct Line {
     int dips = 0, coils = 0, resets = 0, below = 0, above = 0, restarts = 0, stuck = 0;

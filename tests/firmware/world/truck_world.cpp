@@ -278,7 +278,7 @@ void TruckWorld::update_chip(Bq76952Model& which, std::size_t first, std::size_t
   const plant::PinVoltages v = truck.pins();
   const bool is_lower = &which == &chip;
   Bq76952Inputs in;
-  in.internal_c = die_c;
+  in.internal_c = is_lower ? die_c : upper_die_c;
   in.ts2_low = key_on || plugged;
   in.stack_v = is_lower ? sensors.stack_error_v : 0;
   for (std::size_t k = 0; k < count; ++k) {
@@ -289,7 +289,9 @@ void TruckWorld::update_chip(Bq76952Model& which, std::size_t first, std::size_t
     if (setup_.cell_noise_v > 0) input_v += setup_.cell_noise_v * noise_.normal();
   }
   if (stacked()) {
-    in.pack_v = is_lower ? 0 : in.stack_v;  // the place of the chip; LD is at VSS
+    // the place of the chip; without its wire the pin has the other level. LD is at VSS
+    const bool broken = is_lower ? sensors.lower_strap_broken : sensors.upper_strap_broken;
+    in.pack_v = is_lower == broken ? in.stack_v : 0;
   } else {
     in.pack_v = v.pack_v;
     in.ld_v = v.ld_v;

@@ -40,8 +40,9 @@ struct WorldSetup {
 struct SensorFaults {
   std::array<double, 32> cell_error_v{};
   double stack_error_v = 0;
-  double shunt_factor = 1;  ///< 0: a wire of the shunt is off
-  double hall_error_v = 0;  ///< at PA1
+  bool lower_strap_broken = false, upper_strap_broken = false;  ///< of two chips: PACK, which says the chip's place
+  double shunt_factor = 1;                                      ///< 0: a wire of the shunt is off
+  double hall_error_v = 0;                                      ///< at PA1
 };
 
 /// I2C of the board. A reset of the chip resets it. While the program polls a byte on the wire, the time is skipped.
@@ -82,7 +83,7 @@ class TruckWorld {
   /// Keeps the voltage of a cell by its charge; NaN ends it.
   void hold_cell(std::size_t cell, double voltage_v);
   void set_temperature(std::size_t sensor, double celsius);
-  double die_c = 25;  ///< of the front end
+  double die_c = 25, upper_die_c = 25;  ///< of the front end, and of the upper one of two chips
   /// 0: shorted; Bq76952Inputs::open_ohm: broken
   void set_thermistor_ohm(std::size_t sensor, double ohm);
   double temperature_c(std::size_t sensor) const { return celsius_[sensor]; }

@@ -6,7 +6,7 @@
 //   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
 //   --minutes N      duration of the shift
 //   --days N         of each truck of the month; --count is the number of trucks
-//   --cells N        in series, for the starts: another number than 16
+//   --cells N        in series, of another number than 16; the chargers have 16
 //   --jobs N         cases at a time
 //   --continue       takes the good outcomes of earlier runs with this option, of the same image and seed
 //   --from N         leaves the first N cases to other parts
@@ -53,8 +53,8 @@ struct Options {
 void add_counts(const Result& r, nlohmann::ordered_json& json) {
   const std::size_t tried = r.outcomes.size(), failed = r.failed();
   if (r.name.starts_with("starts")) json["drives"] = {{"tried", tried}, {"drove", tried - failed}};
-  if (r.name == "supply dips") json["dips"] = {{"tried", tried}, {"unsafe", failed}};
-  if (r.name == "fault matrix") {
+  if (r.name.starts_with("supply dips")) json["dips"] = {{"tried", tried}, {"unsafe", failed}};
+  if (r.name.starts_with("fault matrix")) {
     double missed = 0, falsely = 0;
     for (const Outcome& o : r.outcomes) {
       missed += o.value("missed", 0);
@@ -62,7 +62,7 @@ void add_counts(const Result& r, nlohmann::ordered_json& json) {
     }
     json["matrix"] = {{"cases", tried}, {"missed", missed}, {"false", falsely}, {"failed", failed}};
   }
-  if (r.name == "overloads") {
+  if (r.name.starts_with("overloads")) {
     json["overloads"] = nlohmann::ordered_json::array();
     for (const Outcome& o : r.outcomes) {
       const double opened_s = o.value("opened", -1);
@@ -118,8 +118,8 @@ Options read_options(const std::vector<std::string>& words) {
       options.scenario = words[k];
     }
   }
-  if (options.extent.cells != Extent{}.cells && options.scenario != "starts")
-    throw std::invalid_argument("--cells is for the starts");
+  if (options.extent.cells != Extent{}.cells && (options.scenario.empty() || options.scenario == "charges"))
+    throw std::invalid_argument("--cells is for one scenario, and not for the charges");
   return options;
 }
 

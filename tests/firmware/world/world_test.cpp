@@ -107,6 +107,20 @@ TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
   for (unsigned k = 0; k < rows.size(); ++k) EXPECT_EQ(rows[k].bit, k);
 }
 
+/// 24 cells: 24 times the limits of a cell; each cell adds 15 mV to the 0.2 V of the stack.
+TEST(Promise, TheRowsOfThePackFollowTheNumberOfCells) {
+  const auto rows = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", 1, 24),
+             printed = promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md");
+  EXPECT_NEAR(rows[6].threshold, 24 * (3.65 + 0.02 * 1.65), 0.01) << "pack overvoltage";
+  EXPECT_NEAR(rows[7].threshold, 24 * (2.0 + 0.06 * 1.65), 0.01) << "pack undervoltage";
+  EXPECT_NEAR(rows[19].threshold, 0.2 + 24 * 0.015, 1e-3) << "sum mismatch";
+  EXPECT_NEAR(rows[19].release_threshold, 0.2 + 24 * 0.005, 1e-3);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    const bool of_pack = k == 6 || k == 7 || k == 19;
+    EXPECT_EQ(rows[k].threshold != printed[k].threshold, of_pack) << rows[k].name;
+  }
+}
+
 /// RM0090, 13.3.8 to 13.5: a sequence of two in single conversions with EOCS, as software polls it.
 TEST(AdcModel, ConvertsASequenceInTheTimesOfTheManual) {
   firmware::UnicornBoard board(pack().image);
