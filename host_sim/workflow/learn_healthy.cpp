@@ -151,22 +151,32 @@ class Learning {
     without.hold_out.clear();
     std::erase_if(without.recordings, [&](const std::string& other) { return same_file(path, other); });
     const bool seen = without.recordings.size() < options_.recordings.size(), only = without.recordings.empty();
-    try {
-      std::optional<files::CellFile> again;
-      if (seen && !only) again = identified(without);
-      for (const Rows& rows : blocks_of(whole, block_s, cell_.parameters.capacity_ah)) {
+    std::optional<files::CellFile> again;
+    if (seen && !only && !used(whole, [&] { again = identified(without); })) return;
+    for (const Rows& rows : blocks_of(whole, block_s, cell_.parameters.capacity_ah)) {
+      used(whole, [&] {  // another block may be what this one is not
         if (only) {
           without.recordings = {path};
           without.left_out = {whole.time_s[rows.first], whole.time_s[rows.first + rows.count - 1]};
           again = identified(without);
         }
         add_block(n, rows, again ? *again : cell_);
-      }
+      });
+    }
+  }
+
+  /// Returns false, with a warning, if no cell file follows from what is left, or if a block cannot be read.
+  template <class Use>
+  bool used(const Recording& whole, const Use& use) {
+    try {
+      use();
+      return true;
     } catch (const FailedFit& failed) {
       warn(whole, failed.what());
     } catch (const files::BadInput& bad) {
       warn(whole, bad.what());
     }
+    return false;
   }
 
   static files::CellFile identified(const IdentifyOptions& options) {

@@ -66,6 +66,14 @@ bool contains(const std::vector<std::string>& causes, const std::string& id) {
   return std::find(causes.begin(), causes.end(), id) != causes.end();
 }
 
+/// Without its first ten minutes no cell file follows from this discharge at one current; without later ones it does.
+TEST(RealFaults, ABlockThatCannotBeComparedTakesNoOtherWithIt) {
+  if (!std::filesystem::exists(data)) GTEST_SKIP() << "no " << data;
+  const files::CellFile file = identified("B0038", {"d006"}, 1.09);
+  ASSERT_EQ(file.healthy.blocks.size(), 1u);
+  EXPECT_GT(file.healthy.blocks.front().start_s, 0);
+}
+
 TEST(RealFaults, AnOffsetOfTheVoltageIsNotReadAsAGain) {
   if (!std::filesystem::exists(data)) GTEST_SKIP() << "no " << data;
   const auto causes = first_causes("B0043", {"d004", "d006"}, "d002", 1.7, [](measurement::Recording& r) {
