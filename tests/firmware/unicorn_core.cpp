@@ -285,18 +285,26 @@ UnicornCore::Run UnicornCore::run_instructions(std::uint32_t from, std::uint64_t
 UnicornCore::Run UnicornCore::finish(int error, std::uint64_t instructions) {
   Run run{.error = error, .pc = reg(UC_ARM_REG_PC), .instructions = instructions, .at_limit = stopped_};
   if (error != UC_ERR_OK) return run;
-  if (const std::uint32_t behind = behind_it_block(run.pc); behind != run.pc)
-    set_reg(UC_ARM_REG_PC, (run.pc = behind) | 1);
+  if (const std::uint32_t now = after_what_was_executed(run.pc); now != run.pc)
+    set_reg(UC_ARM_REG_PC, (run.pc = now) | 1);
   return run;
 }
 
-/// If Unicorn 2.0.1 is stopped within an IT block, it finishes the block. If a translation block begins inside, it
-/// leaves the program counter within the IT block although EPSR.IT is that of its end, and the last instruction would
-/// run twice. A regular stop within an IT block has the state of the block.
-std::uint32_t UnicornCore::behind_it_block(std::uint32_t pc) const {
-  if ((reg(UC_ARM_REG_XPSR) & 0x0600FC00) != 0) return pc;
+/// If Unicorn 2.0.1 is stopped within an IT block, it finishes the block. If a translation block begins inside, as at
+/// the border of two pages, it leaves the program counter at its last instruction although that was executed and
+/// EPSR.IT is the state after it. That state says where the program is: each instruction of an IT block has its own.
+std::uint32_t UnicornCore::after_what_was_executed(std::uint32_t pc) const {
   const auto next = it_blocks_.upper_bound(pc);
-  return next != it_blocks_.begin() && pc < std::prev(next)->second ? std::prev(next)->second : pc;
+  if (next == it_blocks_.begin() || pc >= std::prev(next)->second) return pc;
+  const auto [first, end] = *std::prev(next);
+  const std::uint32_t psr = reg(UC_ARM_REG_XPSR), state = (psr >> 8 & 0xFC) | (psr >> 25 & 3);
+  std::uint32_t at = first;
+  // ARMv7-M, A7.3.2: the state shifts with each instruction, and ends with the last
+  for (std::uint32_t of_next = half_word(first - 2) & 0xFF; at < end; at += half_word(at) >= 0xE800 ? 4U : 2U) {
+    if (state == of_next) return at;
+    of_next = (of_next & 7) == 0 ? 0 : (of_next & 0xE0) | (of_next << 1 & 0x1F);
+  }
+  return end;
 }
 
 void UnicornCore::call(std::uint32_t function, std::uint32_t result) {

@@ -106,7 +106,7 @@ class UnicornCore {
   void begin_block(std::uint32_t address, std::uint32_t bytes);
   /// Numbers of instructions, and of those in IT blocks.
   std::pair<std::uint32_t, std::uint32_t> instructions_in(std::uint32_t address, std::uint32_t bytes) const;
-  std::uint32_t behind_it_block(std::uint32_t pc) const;
+  std::uint32_t after_what_was_executed(std::uint32_t pc) const;
   Run finish(int error, std::uint64_t instructions);
   uc_struct* engine() const { return engines_[active_]; }
 

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unicorn/unicorn.h>
 
 #include "tests/firmware/world/operating.hpp"
 
@@ -164,6 +165,32 @@ std::vector<Switched> switched(const TruckWorld& world) {
       all.push_back({e.relay, e.closes, e.time_s});
   }
   return all;
+}
+
+/// A condition at the border of two pages decided the wrong way there, in one case of 700 of the fault matrix.
+TEST(Instructions, AnItBlockAtTheBorderOfTwoPagesMayBeInterruptedAnywhere) {
+  constexpr std::uint32_t begin = 0x08000FF6;
+  constexpr std::uint8_t code[]{0x00, 0x20,               // movs  r0, #0
+                                0x09, 0x21,               // movs  r1, #9
+                                0x01, 0x28,               // cmp   r0, #1
+                                0xD4, 0xBF,               // ite   le
+                                0x4F, 0xF0, 0x00, 0x01,   // movle r1, #0, the last two bytes on the next page
+                                0x4F, 0xF0, 0x01, 0x01,   // movgt r1, #1
+                                0x00, 0xBF, 0xFE, 0xE7};  // nop, and an endless loop
+  UnicornCore core;
+  core.map(0x08000000, 0x4000, UnicornCore::Access::read_and_execute);
+  ASSERT_TRUE(core.write(begin, code));
+  core.find_instructions({{.address = begin, .name = "$t"}, {.address = begin + sizeof code, .name = "$d"}});
+  core.run_instructions(begin, 8);  // from now on translated code is used again
+  for (std::uint64_t count = 1; count <= 8; ++count) {
+    const UnicornCore::Run run = core.run_instructions(begin, count);
+    const auto registers = core.registers();
+    core.set_reg(UC_ARM_REG_XPSR, 1U << 24);
+    core.run_instructions(begin + sizeof code - 2, 3);  // an interrupt
+    core.set_registers(registers);
+    core.run_instructions(run.pc, 8);
+    EXPECT_EQ(core.reg(UC_ARM_REG_R1), 0U) << "interrupted after " << count << " instructions";
+  }
 }
 
 TEST(Blocks, EndInTheStateOfSingleInstructionsBitForBit) {
