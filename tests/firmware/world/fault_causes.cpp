@@ -169,8 +169,8 @@ std::vector<Cause> other_causes(std::size_t cells) {
   list.push_back({36,
                   "current flows after the request has ended",
                   [](TruckWorld& w) {
-                    // the charger's own current ends with its contactor
-                    if (w.closed(plant::Relay::charge)) set_drive_a(w, -1);
+                    // a fan that stays on; the charger's own current ends with its contactor
+                    if (w.closed(plant::Relay::charge)) set_drive_a(w, -5);
                     w.vehicle.request = Request::none;
                   },
                   0.4,
