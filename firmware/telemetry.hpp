@@ -18,6 +18,7 @@
 #include "firmware/messages.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_data.hpp"
+#include "firmware/stored_state.hpp"
 #include "firmware/truck_message.hpp"
 #include "hal/can.hpp"
 #include "hal/power.hpp"
@@ -61,7 +62,7 @@ class Telemetry {
     publish_truck(now.board);
     if (now.stored_part) [[unlikely]]
       stored_data_.send(*now.stored_part, now.persistence,
-                        static_cast<std::uint32_t>(static_cast<std::int32_t>(now.capacity_ah * 1e6F)));
+                        static_cast<std::uint32_t>(scaled_to_integer(now.capacity_ah, 1e6F)));
     if (now.log_samples) log(now.mean);
     send(messages::pack_state(now.estimate, now.condition));
     send(messages::pack_electrical(now.pack));
