@@ -57,9 +57,15 @@ void run_step(const std::vector<std::string>& argv, const std::filesystem::path&
 const char* ending(Image image) {
   switch (image) {
     case Image::remote:
-    case Image::remote_slot_a:
-    case Image::remote_slot_b:
       return "_remote";
+    case Image::slot_a:
+      return "_slot_a";
+    case Image::slot_b:
+      return "_slot_b";
+    case Image::remote_slot_a:
+      return "_remote_slot_a";
+    case Image::remote_slot_b:
+      return "_remote_slot_b";
     case Image::loader:
       return "_loader";
     case Image::remote_product:
@@ -83,16 +89,17 @@ const char* ending(Image image) {
   }
 }
 
-const char* slot_of(Image image) {
+/// The image that is not linked for a slot.
+Image without_slot(Image image) {
   switch (image) {
     case Image::slot_a:
-    case Image::remote_slot_a:
-      return "a";
     case Image::slot_b:
+      return Image::application;
+    case Image::remote_slot_a:
     case Image::remote_slot_b:
-      return "b";
+      return Image::remote;
     default:
-      return "";
+      return image;
   }
 }
 
@@ -175,18 +182,19 @@ std::filesystem::path build(const SourceTree& sources, const Variant& variant, c
   for (const char* tool : {"cmake", "ninja", "arm-none-eabi-g++", "qemu-system-arm"}) {
     if (!in_path(tool)) throw files::BadInput(tool, 1, "not installed, expected the tools that ./bms installs");
   }
-  const std::string image_name = fmt::format("bms_{}{}", variant.board, ending(image));
-  const auto shared = shared_objects(sources, variant, image_name);
-  const std::string slot = slot_of(image);
+  const auto name_of = [&](Image of) { return fmt::format("bms_{}{}", variant.board, ending(of)); };
+  const std::string image_name = name_of(image);
+  const auto shared = shared_objects(sources, variant, name_of(without_slot(image)));
+  const bool in_a_slot = without_slot(image) != image;
   const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}{}", variant.board, cell.name, cell.hash,
-                                                variant.ending(), slot.empty() ? "" : "-slot_" + slot));
+                                                variant.ending(), in_a_slot ? "-slots" : ""));
   const auto cell_path = folder.path() / "cell.toml";
   if (!std::filesystem::exists(cell_path) || files::read_file(cell_path) != cell.text)
     files::write_file(cell_path, cell.text);
   if (folder.is_new()) {
     if (isatty(2)) fmt::print(stderr, "building the firmware of {} with cell {} (once)\n", variant.board, cell.name);
-    folder.configure(
-        variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(), "-DBMS_SLOT=" + slot});
+    folder.configure(variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(),
+                               std::string("-DBMS_SLOT=") + (in_a_slot ? "a;b" : "")});
   }
   folder.build(image_name + ".elf");
   return folder.path() / (image_name + ".elf");
