@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <span>
 
 #include "diagnosis/thresholds.hpp"
@@ -111,8 +112,9 @@ std::vector<Ranked> ranking_of(Search& search, const LikelihoodModel& likelihood
     for (const HypothesisFit& f : grown.singles) rank(f);
   }
   std::stable_sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
-  const double best_gain = found ? ranking.front().gain : finding_limits.detected;  // or that no mechanism is there
-  double total = found ? 0 : 1;
+  const double no_mechanism = found ? -std::numeric_limits<double>::infinity() : finding_limits.detected;
+  const double best_gain = ranking.empty() ? no_mechanism : std::max(ranking.front().gain, no_mechanism);
+  double total = weight(best_gain - no_mechanism);
   for (const Ranked& r : ranking) total += weight(best_gain - r.gain);
   for (Ranked& r : ranking) r.probability = probability_limits.at_most * weight(best_gain - r.gain) / total;
   return ranking;
