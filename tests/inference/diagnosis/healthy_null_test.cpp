@@ -513,6 +513,26 @@ TEST(DiagnoseWithHealthy, WhatHealthyRecordingsElsewhereConfirmTakesNoAnswerAway
   EXPECT_EQ(diagnose(test::table9(), {}, {healthy}).verdict, Verdict::no_mismatch);
 }
 
+/// The weight of a gain of some thousands beside that of no mechanism is beyond a double.
+TEST(DiagnoseWithHealthy, ProbabilitiesAreNumbersHoweverMuchAWithheldCauseExplains) {
+  Options options;
+  options.healthy = learned(1);
+  options.healthy.blocks.front().soc = {0.9, 1};
+  options.healthy.blocks.front().gains = {{"voltage_offset", 300}};
+  const PreparedRecording faulty = test::recorded(test::drive(0.5, 207), 0.5, 207, not_in_the_model(0.02));
+  const Diagnosis d = diagnose(test::table9(), {}, {faulty}, options);
+  ASSERT_FALSE(names(d.verdict));
+  ASSERT_FALSE(d.candidates.empty());
+  EXPECT_GT(d.candidates.front().gain, 2'200);
+  double sum = 0;
+  for (const Ranked& r : d.candidates) {
+    EXPECT_GE(r.probability, 0);
+    sum += r.probability;
+  }
+  EXPECT_LE(sum, 1);
+  EXPECT_GT(sum, 0);
+}
+
 TEST(DiagnoseWithHealthy, AGoodModelStaysWithoutMismatch) {
   Options options;
   options.healthy = learned(4);
