@@ -513,7 +513,7 @@ TEST(DiagnoseWithHealthy, WhatHealthyRecordingsElsewhereConfirmTakesNoAnswerAway
   EXPECT_EQ(diagnose(test::table9(), {}, {healthy}).verdict, Verdict::no_mismatch);
 }
 
-/// The weight of a gain of some thousands beside that of no mechanism is beyond a double.
+/// The weight of a gain of some thousands next to that of no mechanism is beyond a double.
 TEST(DiagnoseWithHealthy, ProbabilitiesAreNumbersHoweverMuchAWithheldCauseExplains) {
   Options options;
   options.healthy = learned(1);
