@@ -39,6 +39,22 @@ std::string not_covered_reason(const HealthyBasis& healthy) {
       100 * healthy.covered.least, beyond.empty() ? "" : ": ", joined(beyond, "and"));
 }
 
+/// What would have been named, the largest gain first: the first ones in full, the others by name.
+std::string withheld_causes(const Diagnosis& d) {
+  std::vector<Withheld> causes = d.withheld;
+  std::erase_if(causes, [](const Withheld& w) { return w.mechanism == no_mechanism; });
+  if (causes.empty()) return "an unknown cause acts";
+  std::stable_sort(causes.begin(), causes.end(), [](const Withheld& a, const Withheld& b) { return a.gain > b.gain; });
+  std::vector<std::string> in_full, others;
+  for (const Withheld& w : causes) {
+    if (in_full.size() < text_style.causes_in_full)
+      in_full.push_back(claim(w.setting));
+    else
+      others.push_back(name_of(w));
+  }
+  return joined(in_full, "and") + (others.empty() ? "" : ", next to " + joined(others, "and"));
+}
+
 }  // namespace
 
 std::string reason_of(const Withheld& w, const Diagnosis& of) {
@@ -60,6 +76,11 @@ std::string withheld_text(const Diagnosis& d, const std::string& error) {
   // what more data would decide first
   const auto undecided = std::find_if(d.withheld.begin(), d.withheld.end(),
                                       [](const Withheld& w) { return w.not_covered || w.healthy.hours_needed; });
+  if (undecided == d.withheld.end() && goes_beyond_healthy(d) && !d.withheld.empty())
+    return fmt::format(
+        "{} Without healthy recordings the answer would be that {}. Elsewhere they differ from the model as much, so "
+        "this is not certain: {}. {}",
+        error, withheld_causes(d), not_covered_reason(*d.healthy), there);
   if (undecided == d.withheld.end() && goes_beyond_healthy(d))
     return fmt::format(
         "Nothing stands out from the tolerance of the cell file, but more is not known of this recording: {}. {} "
