@@ -14,7 +14,7 @@
 
 namespace bms::estimator {
 
-inline constexpr std::uint32_t longest_count_us = 2'000'000'000U;
+inline constexpr std::int32_t longest_count_us = 2'000'000'000;
 
 namespace charge_ranges {
 
@@ -43,9 +43,9 @@ class Charge {
     correct(soc, scale);
   }
 
-  /// current_ua: at least -2^31 + 1; duration_us: at most longest_count_us.
-  constexpr void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
-    uaus_ += arithmetic::wide_product(current_ua, static_cast<std::int32_t>(duration_us));
+  /// current_ua: at least -2^31 + 1; duration_us: 0 to longest_count_us.
+  constexpr void count(std::int32_t current_ua, std::int32_t duration_us, const Scale& scale) {
+    uaus_ += arithmetic::wide_product(current_ua, duration_us);
     limit_soc(scale);
   }
 
@@ -111,7 +111,7 @@ requires(!counts_in_integers<S>) class Charge<S> {
 
  public:
   void set(const S& soc, const Scale&) { soc_ = soc; }
-  void count(std::int32_t current_ua, std::uint32_t duration_us, const Scale& scale) {
+  void count(std::int32_t current_ua, std::int32_t duration_us, const Scale& scale) {
     soc_ += S(static_cast<double>(current_ua) * static_cast<double>(duration_us) /
               static_cast<double>(scale.capacity_uaus));
   }

@@ -23,15 +23,16 @@ class Condition {
   using Model = typename Estimator::Model;
 
   /// Call it after the estimator's step with the same sample. limits_wanted: whether the current limits are needed.
-  template <class Cell, class State>
+  template <class Cell>
   constexpr void update(const Cell& cell, const measurement::Sample& sample, const Estimate<S>& estimate,
-                        const State& state, bool limits_wanted) {
+                        const Estimator& estimator, bool limits_wanted) {
     using namespace model;
     const std::uint32_t step_us = started_ ? since(sample.time_us) : 0;
     started_ = true;
     time_us_ = sample.time_us;
     const auto& laws = laws_of(cell);
-    const auto& x = state.model_state;
+    const auto& x = estimator.state().model_state;
+    capacity_ = estimator.capacity();
     constexpr std::uint32_t unmeasured = current_missing | current_implausible,
                             unread = voltage_missing | voltage_implausible | voltage_stuck | voltage_rejected |
                                      not_started | not_a_number;
@@ -49,7 +50,11 @@ class Condition {
 
     soc_quality_ = quality_.update(estimate, at, input, counted, step_us / 1'000, cell.noise.resistance_error);
     if ((estimate.flags & not_started) == 0) display_soc_ = display_.update(estimate.soc, counted, input.duration_s);
-    update_health(cell, at, input, sample, estimate, counted, measured && (estimate.flags & unread) == 0);
+    if (measured && (estimate.flags & unread) == 0)
+      resistance_.update(Voltage<S>(from_micro<Voltage<S>>(sample.voltage_uv) - estimate.voltage_predicted_v),
+                         Voltage<S>(at.r0_ohm * input.current_a), cell.noise.voltage_v2);
+    else
+      resistance_.interrupt();
     if (limits_wanted && (!limits_known_ || sample.time_us - limited_us_ >= limits_every_us)) {
       limits_known_ = true;
       limited_us_ = sample.time_us;
@@ -70,12 +75,12 @@ class Condition {
   constexpr bool limits_known() const { return limits_known_; }                 ///< whether they have been computed
   constexpr const CurrentLimits<S>& limits_now() const { return limits_now_; }  ///< for one second
   constexpr const CurrentLimits<S>& limits_10s() const { return limits_10s_; }
-  constexpr Health<S> capacity() const { return capacity_.health(); }
+  constexpr Health<S> capacity() const { return capacity_.health(); }  ///< the estimator's
   constexpr Health<S> resistance() const { return resistance_.health(); }
-  /// Capacity and resistance of an earlier run, before the first sample.
-  constexpr void restore(const Health<S>& capacity, const Health<S>& resistance) {
-    capacity_.restore(capacity);
-    resistance_.restore(resistance);
+  /// Capacity and resistance of an earlier run, before the first sample. resistance_ppm, sigma_ppm: > 0.
+  constexpr void restore(const LearnedRatio<S>& capacity, std::int32_t resistance_ppm, std::int32_t sigma_ppm) {
+    capacity_ = capacity;
+    resistance_.restore(resistance_ppm, sigma_ppm);
   }
 
  private:
@@ -87,36 +92,12 @@ class Condition {
     return us < longest_step_us ? static_cast<std::uint32_t>(us) : longest_step_us;
   }
 
-  template <class Cell>
-  constexpr void update_health(const Cell& cell, const model::TablePoint<S>& at, const model::StepInput<S>& input,
-                               const measurement::Sample& sample, const Estimate<S>& estimate,
-                               const arithmetic::Soc<S>& counted, bool good) {
-    using namespace model;
-    Soc<S> off(0);
-    Variance<S> voltage_soc_variance(1);
-    if (good) {
-      const Voltage<S> innovation_v = from_micro<Voltage<S>>(sample.voltage_uv) - estimate.voltage_predicted_v;
-      resistance_.update(innovation_v, Voltage<S>(at.r0_ohm * input.current_a), cell.noise.voltage_v2);
-      if (soc_quality_.observable) {
-        const VoltagePerSoc<S> slope = ocv_slope<S>(at);
-        const Variance<S> variance_v2 =
-            Variance<S>(at.error_v2 + drop_variance_v2<S>(at, input.current_a, cell.noise.resistance_error));
-        off = ratio<Soc<S>>(innovation_v, slope);
-        voltage_soc_variance = ratio<Variance<S>>(ratio<Variance<S>>(variance_v2, slope), slope);
-      }
-    } else {
-      resistance_.interrupt();
-    }
-    capacity_.update(estimate.soc, off, voltage_soc_variance, good && soc_quality_.observable, counted,
-                     product<Variance<S>>(cell.noise.walk_soc2_per_s, input.duration_s));
-  }
-
   SocQuality<S> quality_;
   typename SocQuality<S>::Result soc_quality_;
   DisplaySoc<S> display_;
   arithmetic::Soc<S> display_soc_{};
   CurrentLimits<S> limits_now_, limits_10s_;
-  CapacityHealth<S> capacity_;
+  LearnedRatio<S> capacity_{CapacityHealth<S>::initial_sigma};
   ResistanceHealth<S> resistance_;
   std::uint64_t time_us_ = 0, limited_us_ = 0;
   std::uint8_t interval_ = 0;

@@ -60,6 +60,11 @@ class PersistentErrorsInSigma {
                                       const arithmetic::TimeStep<S>& duration_s) {
     return white + arithmetic::product<Variance>(noise.walk_soc2_per_s, duration_s);
   }
+  /// By how much the variance of the counted charge grows in a time. before_soc2: what it was.
+  static constexpr Variance counted_variance(const State&, const Noise& noise, const Variance&,
+                                             const arithmetic::TimeStep<S>& duration_s) {
+    return arithmetic::product<Variance>(noise.walk_soc2_per_s, duration_s);
+  }
   /// Variance of that part of the model's voltage error which the filter does not estimate. error_v2: all of it at this
   /// SOC; soc_axis_v2(): its part from the SOC axis of the tables.
   template <class F>
@@ -137,6 +142,13 @@ class PersistentErrorsAsStates {
 
   static constexpr Variance soc_noise(const Variance& white, const Noise&, const arithmetic::TimeStep<S>&) {
     return white;
+  }
+  /// The offset keeps its sign, so standard deviations add: (sigma + d)^2 - sigma^2.
+  static constexpr Variance counted_variance(const State& state, const Noise&, const Variance& before_soc2,
+                                             const arithmetic::TimeStep<S>& duration_s) {
+    const Soc per_h = arithmetic::root<Soc>(state.covariance.template variance<Model::last>());
+    const Soc d = Soc(Soc(per_h * Fraction(1.0 / 3'600)) * duration_s), sigma = arithmetic::root<Soc>(before_soc2);
+    return Variance(Variance(d * d) + Variance((sigma + sigma) * d));
   }
   template <class F>
   static constexpr Variance error_in_noise(const Noise& noise, const Variance&, F&& soc_axis_v2) {

@@ -8,6 +8,7 @@
 // The parts, each with its own header:
 //   input_check.hpp         which readings are used
 //   step_constants.hpp      what depends on the time step and the temperature alone
+//   charge_count.hpp        charge, and the capacity with which it is counted
 //   persistent_errors.hpp   errors that last for hours: as noise or as states
 //   first_state.hpp         the state at the first sample
 //   soc_monitor.hpp         finds out when the voltages contradict the SOC, and then estimates it again
@@ -30,6 +31,7 @@
 #include <type_traits>
 
 #include "estimator/cell_state.hpp"
+#include "estimator/charge_count.hpp"
 #include "estimator/estimate.hpp"
 #include "estimator/first_state.hpp"
 #include "estimator/input_check.hpp"
@@ -78,15 +80,17 @@ class SocEstimator {
     const StepInput input{laws.true_current(Model::without_offset(arithmetic::from_micro<Current>(current.ua),
                                                                   state_.model_state, cell.noise)),
                           constants_.duration_s(), temperature(laws, sample.temperature_cdegc)};
-    count_charge(cell, counted_ua(laws, input, current.ua), step_us);
+    count_.count(state_.charge, counted_ua(laws, input, current.ua), step_us, cell.charge);
 
     const Soc soc = state_.charge.soc(cell.charge);
     const auto at = look_up(operating_point(cell, input), soc, interval_);
     const auto discretisation = Model::discretise(laws, state_.model_state, at, input, constants_.error_decay());
     auto noise = Model::noise(laws, discretisation, cell.noise);
     noise[Model::soc] = constants_.soc_noise();
-    if ((flags & (unmeasured | current_varies)) != 0) [[unlikely]]
+    if ((flags & (unmeasured | current_varies)) != 0) [[unlikely]] {
       flags = add_unknown_current(cell, at, input, flags, noise);
+      count_.lose(Variance(noise[Model::soc] - constants_.soc_noise()));
+    }
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
     state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
     state_.model_state = Model::advance(state_.model_state, at, discretisation, input);
@@ -100,6 +104,7 @@ class SocEstimator {
     estimate.voltage_predicted_v = predicted_v;
     estimate.flags = flags;
     report_state(cell, estimate);
+    count_.corrected(Soc(estimate.soc - soc));
     if constexpr (std::floating_point<S>) {
       if (!is_finite(estimate)) [[unlikely]]
         return start_again(cell, flags);
@@ -107,6 +112,12 @@ class SocEstimator {
     errors_.bound_gain_error(estimate.soc, estimate.soc_sigma, cell.noise.gain);
     return estimate;
   }
+
+  /// Goes on with the capacity that an earlier run has found. Before the first sample.
+  constexpr void restore_capacity(const measurement::StartingCapacity& found) { count_.restore(found); }
+  /// Relative to that of the cell file. counted_capacity_ppm: with which the charge is counted [1e-6].
+  constexpr const LearnedRatio<S>& capacity() const { return count_.capacity(); }
+  constexpr std::int32_t counted_capacity_ppm() const { return count_.counted_ppm(); }
 
   constexpr const CellState<S, ModelOf>& state() const { return state_; }
   /// Time of the last accepted sample.
@@ -124,8 +135,7 @@ class SocEstimator {
   using Variance = arithmetic::Variance<S>;
   using Fraction = arithmetic::Fraction<S>;
   using TimeStep = arithmetic::TimeStep<S>;
-
-  static constexpr int longest_gap_counts = 1'000;  ///< of longest_count_us: 23 days; nothing is known after that
+  using Curve = typename ChargeCount<S>::Curve;
 
   static constexpr std::uint32_t unmeasured = time_gap | current_missing | current_implausible;
   static constexpr std::uint32_t voltage_was_used = 1U << 31;  ///< of check_voltage(); not a Flag
@@ -169,18 +179,6 @@ class SocEstimator {
     return laws.true_temperature(arithmetic::from_centi<Temperature>(temperature_cdegc_));
   }
 
-  template <class Cell>
-  constexpr void count_charge(const Cell& cell, std::int32_t current_ua, std::uint64_t step_us) {
-    if (step_us > longest_count_us) [[unlikely]] {
-      for (int counts = 0; step_us > longest_count_us && counts < longest_gap_counts; ++counts) {
-        state_.charge.count(current_ua, longest_count_us, cell.charge);
-        step_us -= longest_count_us;
-      }
-      if (step_us > longest_count_us) step_us = longest_count_us;
-    }
-    state_.charge.count(current_ua, static_cast<std::uint32_t>(step_us), cell.charge);
-  }
-
   /// Also true for every step of 2^32 us and more: comparing 64 bits costs one instruction more.
   constexpr bool is_unchecked(std::uint64_t step_us) const {
     return ((static_cast<std::uint32_t>(step_us) ^ checked_step_us_) | static_cast<std::uint32_t>(step_us >> 32)) != 0;
@@ -194,6 +192,7 @@ class SocEstimator {
     const bool gap = check_.gap(constants_.capped(step_us), flags), hides = step_us >= row_hides_us;
     checked_step_us_ = gap || hides ? 0 : static_cast<std::uint32_t>(step_us);
     if (constants_.step_us() != step_us) constants_.set_time_step(cell.noise, step_us);
+    count_.set_time_step(step_us);
     half_change_ua_ = hides && row_hid_ ? current_ua / 2 - row_ua_ / 2 : 0;
     row_ua_ = current_ua;
     row_hid_ = hides;
@@ -252,7 +251,7 @@ class SocEstimator {
     if (monitor_.is_due(innovation_v)) [[unlikely]] {
       const std::uint32_t found =
           check_voltage(cell, input.current_a, input.temperature_c, soc, Voltage(predicted_v - at.ocv_v), innovation_v,
-                        (flags & unmeasured) == 0);
+                        Curve{ocv_slope<S>(at), at.error_v2}, (flags & unmeasured) == 0);
       flags |= found & ~voltage_was_used;
       if (found != 0) return;
     }
@@ -277,13 +276,21 @@ class SocEstimator {
   template <class Cell>
   [[gnu::noinline]] constexpr std::uint32_t check_voltage(const Cell& cell, Current current_a,
                                                           Temperature temperature_c, Soc soc, Voltage above_ocv_v,
-                                                          Voltage innovation_v, bool measured) {
-    monitor_.watch(cell, constants_, state_, time_us_, current_a, above_ocv_v, innovation_v, measured);
-    if (!monitor_.needs_check(soc, innovation_v)) return 0;
+                                                          Voltage innovation_v, Curve curve, bool measured) {
+    const std::uint32_t since_us =
+        monitor_.watch(cell, constants_, state_, time_us_, current_a, above_ocv_v, innovation_v, measured);
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
-    const std::uint32_t found =
-        monitor_.judge(cell, input, constants_, soc, innovation_v,
-                       monitor_.resistance_error_v2(constants_, above_ocv_v, state_), interval_, state_);
+    std::uint32_t found = 0;
+    if (monitor_.needs_check(soc, innovation_v))
+      found = monitor_.judge(cell, input, constants_, soc, innovation_v,
+                             monitor_.resistance_error_v2(constants_, above_ocv_v, state_), interval_, state_);
+    if (since_us != 0 &&
+        count_.update(
+            soc, Errors::with_error(state_, innovation_v), curve, found == 0,
+            Errors::counted_variance(state_, cell.noise, count_.variance(), arithmetic::seconds<S>(since_us)), [&] {
+              return Variance(cell.noise.voltage_v2 + monitor_.resistance_error_v2(constants_, above_ocv_v, state_));
+            }))
+      checked_step_us_ = 0;
     if (found != 0 || !monitor_.bank_is_open()) return found;
     std::uint8_t interval = interval_;
     observe(cell, look_up(operating_point(cell, input), soc, interval), input, innovation_v);
@@ -317,6 +324,7 @@ class SocEstimator {
     Result estimate;
     estimate.flags = flags | not_a_number;
     report_state(cell, estimate);
+    count_.begin(estimate.soc);
     errors_.start(estimate.soc);
     const SocDistribution<S> soc{estimate.soc, anything};
     monitor_.start(cell);
@@ -360,6 +368,7 @@ class SocEstimator {
                            has_start_ ? &from_ : nullptr, voltage ? &sample.voltage_uv : nullptr);
     estimate.voltage_predicted_v = Model::voltage(laws, state_.model_state, at, input);
     report_state(cell, estimate);
+    count_.begin(estimate.soc);
     errors_.start(estimate.soc);
     return estimate;
   }
@@ -377,6 +386,7 @@ class SocEstimator {
   std::int16_t temperature_bin_ = no_temperature_bin;
   StepConstants<S, Model, Errors> constants_;
   SocMonitor<S, ModelOf> monitor_;
+  ChargeCount<S> count_;
   measurement::StartingPoint from_;
   bool has_start_ = false, started_ = false;
 };

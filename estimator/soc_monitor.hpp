@@ -57,12 +57,13 @@ class SocMonitor {
   constexpr const Variance& reading_noise_v2() const { return reading_noise_v2_; }
 
   /// Updates the means over half an hour. above_ocv_v: predicted voltage above the OCV; measured: the current was.
+  /// Returns the time since the last regular check; 0 if this is not one.
   template <class Cell, class Constants>
-  constexpr void watch(const Cell& cell, const Constants& constants, const State& state, std::uint64_t time_us,
-                       const Current& current_a, const Voltage& above_ocv_v, const Voltage& innovation_v,
-                       bool measured) {
+  constexpr std::uint32_t watch(const Cell& cell, const Constants& constants, const State& state, std::uint64_t time_us,
+                                const Current& current_a, const Voltage& above_ocv_v, const Voltage& innovation_v,
+                                bool measured) {
     const std::uint64_t since_us = consistency_.begin(time_us, bank_.open());
-    if (since_us == 0) return;
+    if (since_us == 0) return 0;
     share_ = Consistency<S>::share_of(arithmetic::seconds<S>(Constants::capped(since_us)));
     if (measured) {
       consistency_.add(Errors::with_error(state, innovation_v), Errors::without_error(state, above_ocv_v), share_);
@@ -76,6 +77,7 @@ class SocMonitor {
     if (constants.extrapolated() > Fraction(0)) [[unlikely]]
       reading_noise_v2_ = Variance(reading_noise_v2_ +
                                    arithmetic::product<Variance>(seen_v2(constants), constants.correlated_samples()));
+    return Constants::capped(since_us);
   }
 
   constexpr bool needs_check(const Soc& soc, const Voltage& innovation_v) const {

@@ -72,7 +72,7 @@ class Application {
     if (board_.cell_file_changed) return;
     store_setting(cell_file_key, cell_hash_);
     if constexpr (cells > 1) restore_cells(cells_, persistence.cells());
-    restore_health(condition_, persistence.health());
+    restore_health(estimator_, condition_, persistence.health());
   }
 
   /// acquisition_us: time that the acquisition of the sample took, part of Board.LongestSample

@@ -9,7 +9,7 @@ namespace bms::firmware {
 void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                  const measurement::Sample& sample, const Estimator::Result& estimate,
                                  bool limits_wanted) {
-  condition.update(tables(), sample, estimate, estimator.state(), limits_wanted);
+  condition.update(tables(), sample, estimate, estimator, limits_wanted);
 }
 
 void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differences,

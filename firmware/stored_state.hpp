@@ -113,9 +113,9 @@ inline std::optional<measurement::StartingPoint> stored_starting_point(const sto
 }
 
 /// Restores capacity and resistance. What no measurement can have given is ignored.
-template <class Condition>
-constexpr void restore_health(Condition& condition, const std::optional<storage::HealthRecord>& stored) {
-  using S = typename Condition::S;
+template <class Estimator, class Condition>
+constexpr void restore_health(Estimator& estimator, Condition& condition,
+                              const std::optional<storage::HealthRecord>& stored) {
   constexpr std::int32_t least_ppm = 100'000, most_ppm = 4'000'000, whole_ppm = 1'000'000;
   const auto possible = [](std::int32_t ratio_ppm, std::int32_t sigma_ppm) {
     return ratio_ppm >= least_ppm && ratio_ppm <= most_ppm && sigma_ppm > 0 && sigma_ppm <= whole_ppm;
@@ -123,12 +123,8 @@ constexpr void restore_health(Condition& condition, const std::optional<storage:
   if (!stored || !possible(stored->capacity_ppm, stored->capacity_sigma_ppm) ||
       !possible(stored->resistance_ppm, stored->resistance_sigma_ppm))
     return;
-  const auto health = [](std::int32_t ratio_ppm, std::int32_t sigma_ppm) {
-    return estimator::Health<S>{arithmetic::from_micro<arithmetic::Factor<S>>(ratio_ppm),
-                                arithmetic::from_micro<arithmetic::Soc<S>>(sigma_ppm)};
-  };
-  condition.restore(health(stored->capacity_ppm, stored->capacity_sigma_ppm),
-                    health(stored->resistance_ppm, stored->resistance_sigma_ppm));
+  estimator.restore_capacity({stored->capacity_ppm, stored->capacity_sigma_ppm});
+  condition.restore(estimator.capacity(), stored->resistance_ppm, stored->resistance_sigma_ppm);
 }
 
 /// Restores the differences of the cells. Ignored if the number of cells differs.

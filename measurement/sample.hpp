@@ -32,4 +32,10 @@ struct StartingPoint {
   std::int32_t soc_sigma_ppb = 0;  ///< standard deviation, 1e-9
 };
 
+/// Capacity before the first sample, from storage, relative to the cell file. Default: nothing is known.
+struct StartingCapacity {
+  std::int32_t ratio_ppm = 1'000'000;  ///< 1e-6
+  std::int32_t sigma_ppm = 100'000;    ///< standard deviation, 1e-6
+};
+
 }  // namespace bms::measurement

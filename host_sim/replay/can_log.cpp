@@ -65,7 +65,7 @@ class Runs {
 
  private:
   /// What the firmware sends before its first sample.
-  struct Start {
+  struct StartFrames {
     bool received = false;
     std::optional<measurement::StartingPoint> point;
   };
@@ -82,10 +82,20 @@ class Runs {
       if (m.given != 0) start_.point = measurement::StartingPoint{m.soc_ppb, 0};
     } else if (is<can::StartingSigma>(frame) && start_.point) {
       start_.point->soc_sigma_ppb = can::StartingSigma::of(frame).sigma_ppb;
+    } else if (is<can::Health>(frame) && capacity_wanted_) {
+      receive_capacity(can::Health::of(frame));
     } else if (is<can::Identity>(frame)) {
       cell_hash_ = can::Identity::of(frame).cell_hash;
       if (!runs_.empty()) runs_.back().cell_hash = cell_hash_;
     }
+  }
+
+  /// The first one of a run has the capacity with which the firmware began: it takes minutes to learn another one.
+  void receive_capacity(const can::Health& m) {
+    capacity_wanted_ = false;
+    if (m.capacity > 0 && m.capacity_sigma > 0)
+      runs_.back().start.capacity = {static_cast<std::int32_t>(std::lround(1e4F * m.capacity)),
+                                     static_cast<std::int32_t>(std::lround(1e4F * m.capacity_sigma))};
   }
 
   /// Samples between the last one and this one.
@@ -111,6 +121,7 @@ class Runs {
       CanLog& run = runs_.emplace_back();
       run.from_the_start = start_.received && counter_ == 1;
       if (run.from_the_start) run.start = start_.point;
+      capacity_wanted_ = run.from_the_start;
       run.cell_hash = cell_hash_;
     } else {
       runs_.back().lost += missing();
@@ -143,7 +154,8 @@ class Runs {
   double last_received_s_ = 0;
   std::uint64_t last_time_us_ = 0;
   std::size_t count_ = 0, longest_ = 0, dropped_ = 0;
-  Start start_;
+  StartFrames start_;
+  bool capacity_wanted_ = false;
   std::optional<std::uint32_t> cell_hash_;
 };
 

@@ -20,7 +20,7 @@ namespace bms::replay {
 struct CanLog {
   measurement::Recording recording;  ///< the samples as numbers; its warnings name what is missing
   std::vector<measurement::Sample> samples;
-  std::optional<measurement::StartingPoint> start;
+  Start start;
   bool from_the_start = false;  ///< begins with the first sample of the firmware, and has its starting point
   std::vector<std::optional<std::uint32_t>> hashes;  ///< after each sample
   std::size_t unbroken = 0;                          ///< samples before the first lost one

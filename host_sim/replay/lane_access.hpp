@@ -18,8 +18,10 @@ struct LaneValues {
   std::int32_t current_ua = 0, voltage_uv = 0, repeats = 0;
   float drop_at_change_v = 0;
   std::uint64_t time_us = 0;
+  float corrected = 0;
   // these change in other steps only
   std::uint64_t step_us = 0;  ///< of an ordinary step; 0: no step is ordinary
+  std::int32_t file_us = 0;   ///< for which the charge counts the current then
   std::int32_t temperature_bin = 0;
   float duration_s = 0, soc_noise = 0, correlated_samples = 0, resistance_noise = 0;
   float reading_noise_v2 = 0, unchecked_below_v = 0;
@@ -44,7 +46,9 @@ struct LaneAccess {
             .repeats = e.check_.repeats_,
             .drop_at_change_v = e.check_.drop_at_change_v_,
             .time_us = e.time_us_,
-            .step_us = e.started_ && e.checked_step_us_ <= longest_count_us ? e.checked_step_us_ : 0,
+            .corrected = e.count_.corrected_,
+            .step_us = e.started_ && e.count_.file_us_ >= 0 ? e.checked_step_us_ : 0,
+            .file_us = e.count_.file_us_,
             .temperature_bin = e.temperature_bin_,
             .duration_s = e.constants_.duration_s(),
             .soc_noise = e.constants_.soc_noise(),
@@ -70,6 +74,7 @@ struct LaneAccess {
     e.check_.repeats_ = static_cast<std::uint8_t>(from.repeats);
     e.check_.drop_at_change_v_ = from.drop_at_change_v;
     e.time_us_ = from.time_us;
+    e.count_.corrected_ = from.corrected;
   }
 
   /// One lane of a state in lanes.

@@ -35,7 +35,7 @@ class LaneFilter {
   [[gnu::flatten]] Mask step(const LaneCells<Registers>& cells, const LaneReadings<Registers>& read, const Mask& wanted,
                              estimator::Estimate<S>& estimate) {
     State next = state_;
-    next.charge.count(read.current_ua, step_us_);
+    next.charge.count(read.current_ua, file_us_);
     const S soc = next.charge.soc(cells.charge);
     const model::LawSet<S> laws;
     const Int current_ua(read.current_ua), voltage_uv(read.voltage_uv);
@@ -63,10 +63,13 @@ class LaneFilter {
                           voltage.follows(voltage_uv, at.r0_ohm * input.current_a) &
                           (magnitude(innovation_v) <= unchecked_below_v_) & is_finite(estimate) &
                           Charge::in_range(soc) & Charge::in_range(estimate.soc);
+    const S corrected = corrected_ + (estimate.soc - soc);
     if (all(ordinary)) [[likely]] {
+      corrected_ = corrected;
       state_ = next;
       voltage_ = voltage;
     } else {
+      corrected_ = select(ordinary, corrected, corrected_);
       state_ = Access::chosen(ordinary, next, state_);
       voltage_ = chosen(ordinary, voltage, voltage_);
     }
@@ -79,13 +82,14 @@ class LaneFilter {
     voltage_.uv.set(lane, v.voltage_uv);
     voltage_.repeats.set(lane, v.repeats);
     voltage_.drop_at_change_v.set(lane, v.drop_at_change_v);
+    corrected_.set(lane, v.corrected);
     reading_noise_v2_.set(lane, v.reading_noise_v2);
     unchecked_below_v_.set(lane, v.unchecked_below_v);
     set_constants(lane, v);
   }
   /// What depends on the time step and the temperature.
   void set_constants(std::size_t lane, const LaneValues<ModelOf>& v) {
-    step_us_[lane] = static_cast<std::int64_t>(v.step_us);
+    file_us_[lane] = v.file_us;
     constants_.duration_s.set(lane, v.duration_s);
     constants_.soc_noise.set(lane, v.soc_noise);
     constants_.correlated.set(lane, v.correlated_samples);
@@ -97,6 +101,7 @@ class LaneFilter {
     v.voltage_uv = voltage_.uv[lane];
     v.repeats = voltage_.repeats[lane];
     v.drop_at_change_v = voltage_.drop_at_change_v[lane];
+    v.corrected = corrected_[lane];
   }
 
  private:
@@ -151,7 +156,8 @@ class LaneFilter {
   State state_;
   Voltage voltage_;
   Constants constants_;
-  std::array<std::int64_t, S::size> step_us_{};
+  std::array<std::int64_t, S::size> file_us_{};
+  S corrected_;  ///< SocEstimator::corrected_
   S reading_noise_v2_, unchecked_below_v_;
   LaneIntervals<Registers> intervals_;
 };

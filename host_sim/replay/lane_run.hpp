@@ -169,7 +169,7 @@ class LaneRun {
     last_alone_[lane] = row;
     ++single_steps_;
     // while every sample is checked, the estimator steps alone
-    in_filter_[lane] = v.step_us != 0 && v.unchecked_below_v > 0 && v.step_us <= longest_us(*cells_.cell[lane]);
+    in_filter_[lane] = v.step_us != 0 && v.unchecked_below_v > 0 && v.file_us <= longest_us(*cells_.cell[lane]);
     if (!in_filter_[lane]) v.step_us = 0;
     if (in_filter_[lane]) filter_.set(lane, v);
     if (v.temperature_bin != old.temperature_bin) check_temperatures(row);
@@ -187,9 +187,8 @@ class LaneRun {
   }
 
   /// Longest step in which a plausible current changes the charge by no more than lanes can count.
-  static std::uint64_t longest_us(const LaneCell& cell) {
-    return static_cast<std::uint64_t>(estimator::Charge<S>::most_counted * cell.charge.capacity_uaus /
-                                      cell.plausible.current_max_ua);
+  static std::int64_t longest_us(const LaneCell& cell) {
+    return estimator::Charge<S>::most_counted * cell.charge.capacity_uaus / cell.plausible.current_max_ua;
   }
 
   void write(std::size_t lane, std::size_t rows, estimator::EstimateWords* words) {

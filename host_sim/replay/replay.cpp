@@ -65,8 +65,8 @@ double Track::state(std::size_t row, std::size_t index) const {
   return state_scales[index] * (scalar == ScalarKind::float64 ? state_numbers[at] : number_of(state_words[at], scalar));
 }
 
-Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples,
-                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar, Timing timing) {
+Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples, const Start& start,
+                  ScalarKind scalar, Timing timing) {
   Track track = [&] {
     switch (scalar) {
       case ScalarKind::fixed:

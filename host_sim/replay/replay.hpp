@@ -92,6 +92,21 @@ struct SocPrior {
   double soc = 0;
   double sigma = 0.02;
 };
+/// What is known before the first sample.
+struct Start {
+  Start() = default;
+  Start(std::nullopt_t) {}
+  Start(const measurement::StartingPoint& point) : soc(point) {}
+  Start(const std::optional<measurement::StartingPoint>& point) : soc(point) {}
+  /// Whether the capacity is not that of a battery which has learned nothing.
+  bool learned() const {
+    constexpr measurement::StartingCapacity none;
+    return capacity && (capacity->ratio_ppm != none.ratio_ppm || capacity->sigma_ppm != none.sigma_ppm);
+  }
+
+  std::optional<measurement::StartingPoint> soc;
+  std::optional<measurement::StartingCapacity> capacity;
+};
 /// shift: correction of such an assumption by the cell file (mechanism initial_soc). Clamped to 0 .. 1.
 std::optional<measurement::StartingPoint> starting_point(const std::optional<SocPrior>& prior, double shift = 0);
 
@@ -103,9 +118,8 @@ void name_states(Track& track, const files::CellFile& cell);
 enum class Timing { measured, none };
 
 /// Runs the estimator on this machine. Throws BadInput if the cell file cannot be computed with this scalar.
-Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples,
-                  const std::optional<measurement::StartingPoint>& start, ScalarKind scalar,
-                  Timing timing = Timing::measured);
+Track run_on_host(const files::CellFile& cell, const measurement::SampleList& samples, const Start& start,
+                  ScalarKind scalar, Timing timing = Timing::measured);
 
 /// The first difference between two runs.
 struct Difference {

@@ -58,9 +58,9 @@ template <class Estimator, class Cell>
 
 /// Runs once and calls take(estimates, count) for each block. Returns the processor time of the estimator alone [s].
 template <class Estimator, class Cell, class Take>
-double run_once(const Cell& cell, const measurement::SampleList& samples,
-                const std::optional<measurement::StartingPoint>& start, Take&& take) {
-  Estimator estimator = start ? Estimator(*start) : Estimator();
+double run_once(const Cell& cell, const measurement::SampleList& samples, const Start& start, Take&& take) {
+  Estimator estimator = start.soc ? Estimator(*start.soc) : Estimator();
+  if (start.capacity) estimator.restore_capacity(*start.capacity);
   std::vector<measurement::Sample> space;
   std::vector<typename Estimator::Result> estimates(std::min(block_rows, samples.size()));
   double seconds = 0;
@@ -78,8 +78,8 @@ double run_once(const Cell& cell, const measurement::SampleList& samples,
 }
 
 template <class Estimator, class Cell>
-Track run_estimator(const Cell& cell, const measurement::SampleList& samples,
-                    const std::optional<measurement::StartingPoint>& start, std::size_t extra, Timing timing) {
+Track run_estimator(const Cell& cell, const measurement::SampleList& samples, const Start& start, std::size_t extra,
+                    Timing timing) {
   using S = typename Estimator::Scalar;
   constexpr bool numbers = std::same_as<S, double>;
   std::vector<std::conditional_t<numbers, EstimateRow, estimator::EstimateWords>> rows;
@@ -142,8 +142,7 @@ auto with_estimator_for(const model::ChosenLaws<S>& laws, bool errors, Run run) 
 
 template <class S>
 Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, model::ChosenLaws<S>>& cell, bool errors,
-                          const measurement::SampleList& samples,
-                          const std::optional<measurement::StartingPoint>& start, Timing timing) {
+                          const measurement::SampleList& samples, const Start& start, Timing timing) {
   return with_estimator_for<S>(cell.laws, errors, [&]<class E>(std::type_identity<E>) {
     return run_estimator<E>(cell, samples, start, (errors ? error_values : 0) + cell.laws.states(), timing);
   });
@@ -151,15 +150,14 @@ Track run_with_mechanisms(const model::ExtendedCell<S, model::max_intervals, mod
 
 using FixedExtendedCell =
     model::ExtendedCell<arithmetic::FixedPoint, model::max_intervals, model::ChosenLaws<arithmetic::FixedPoint>>;
-extern template Track run_with_mechanisms<arithmetic::FixedPoint>(
-    const FixedExtendedCell& cell, bool errors, const measurement::SampleList& samples,
-    const std::optional<measurement::StartingPoint>& start, Timing timing);
+extern template Track run_with_mechanisms<arithmetic::FixedPoint>(const FixedExtendedCell& cell, bool errors,
+                                                                  const measurement::SampleList& samples,
+                                                                  const Start& start, Timing timing);
 
 }  // namespace replay_detail
 
 template <class S>
-Track run(const files::CellFile& file, const measurement::SampleList& samples,
-          const std::optional<measurement::StartingPoint>& start, Timing timing) {
+Track run(const files::CellFile& file, const measurement::SampleList& samples, const Start& start, Timing timing) {
   const auto cell = model::prepare<S, model::max_intervals>(file.parameters);
   const auto mechanisms = files::on_board(file.mechanisms);
   const bool errors = file.parameters.noise.errors_are_states;
@@ -171,11 +169,10 @@ Track run(const files::CellFile& file, const measurement::SampleList& samples,
 }
 
 extern template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples,
-                                 const std::optional<measurement::StartingPoint>& start, Timing timing);
+                                 const Start& start, Timing timing);
 extern template Track run<double>(const files::CellFile& file, const measurement::SampleList& samples,
-                                  const std::optional<measurement::StartingPoint>& start, Timing timing);
+                                  const Start& start, Timing timing);
 extern template Track run<arithmetic::FixedPoint>(const files::CellFile& file, const measurement::SampleList& samples,
-                                                  const std::optional<measurement::StartingPoint>& start,
-                                                  Timing timing);
+                                                  const Start& start, Timing timing);
 
 }  // namespace bms::replay

@@ -3,6 +3,6 @@
 namespace bms::replay {
 
 template Track run<arithmetic::FixedPoint>(const files::CellFile& file, const measurement::SampleList& samples,
-                                           const std::optional<measurement::StartingPoint>& start, Timing timing);
+                                           const Start& start, Timing timing);
 
 }  // namespace bms::replay

@@ -2,7 +2,7 @@
 
 namespace bms::replay {
 
-template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples,
-                          const std::optional<measurement::StartingPoint>& start, Timing timing);
+template Track run<float>(const files::CellFile& file, const measurement::SampleList& samples, const Start& start,
+                          Timing timing);
 
 }  // namespace bms::replay

@@ -48,7 +48,7 @@ struct ReplayOptions {
 struct ReplayRun {
   const images::EmulatedBoard* board = nullptr;  ///< nullptr: the host
   std::optional<replay::CanLog> log;
-  std::optional<measurement::StartingPoint> start;
+  replay::Start start;
   std::size_t compared = 0;     ///< samples of the log whose estimates were compared
   std::vector<PackCell> cells;  ///< of a pack recording
   replay::ReplayResult result;
@@ -158,10 +158,11 @@ ReplayRun read(const ReplayOptions& options) {
     result.prior = replay::SocPrior{*options.initial_soc, options.initial_soc_sigma};
     result.initial_soc = *options.initial_soc;
   }
-  run.start =
-      run.log && !options.initial_soc
-          ? run.log->start
-          : replay::starting_point(result.prior, replay::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
+  if (run.log && !options.initial_soc)
+    run.start = run.log->start;
+  else
+    run.start =
+        replay::starting_point(result.prior, replay::value_of(result.cell.mechanisms, model::InitialSoc::id, 0));
   return run;
 }
 
@@ -177,10 +178,12 @@ void judge(const ReplayOptions& options, replay::ReplayResult& result) {
 
 void compute(const ReplayOptions& options, ReplayRun& run) {
   replay::ReplayResult& result = run.result;
+  if (run.board != nullptr && run.start.learned())
+    throw files::BadInput(options.recording, 1, "the firmware had learned a capacity, expected --target host");
   if (run.board != nullptr) {
     const files::CellFile board_cell = options.board_cell.empty() ? result.cell : files::read_cell(options.board_cell);
     result.track = run_on(*run.board, board_cell, run.log ? run.log->samples : measurement::samples(result.recording),
-                          run.start, result.scalar);
+                          run.start.soc, result.scalar);
   }
   if (run.board == nullptr || options.verify) {
     const measurement::SampleList samples =
@@ -206,9 +209,9 @@ void compute(const ReplayOptions& options, ReplayRun& run) {
   replay::evaluate(result);
   // a board counts with the capacity that it has
   if (run.board == nullptr && !run.log)
-    replay::count_with_estimated_capacity(result, measurement::SampleList(result.recording), run.start);
+    replay::count_with_estimated_capacity(result, measurement::SampleList(result.recording), run.start.soc);
   judge(options, result);
-  if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start);
+  if (!result.recording.cell_voltage_v.empty()) run.cells = replay_cells(result, run.start.soc);
 }
 
 std::string voltage_text(const replay::VoltageFigures& v) {

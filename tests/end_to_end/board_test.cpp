@@ -2,6 +2,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "tests/end_to_end/run_tool.hpp"
 #include "tests/host_sim/files/rejected_input.hpp"
 
@@ -16,6 +19,59 @@ TEST(Board, ComputesTheShiftBitForBitLikeTheHost) {
   const ToolRun run = run_tool("replay " + shift + on_board);
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_THAT(run.out, HasSubstr("Verified: 28801 estimates, every bit equal on netduinoplus2."));
+}
+
+/// 20 minutes of rest before and after each of six charges and discharges of a cell with 78 % of its file's capacity.
+std::string profile_of_a_worn_cell() {
+  std::string rows = "time_s,current_a,temperature_c\n";
+  double soc = 0.97;
+  int time_s = 0;
+  const auto second = [&](double current_a) {
+    soc += current_a / (0.78 * 6 * 3'600);
+    rows += std::to_string(++time_s) + "," + std::to_string(current_a) + ",25\n";
+  };
+  const auto rest = [&] {
+    for (int k = 0; k < 1'200; ++k) second(0);
+  };
+  rest();
+  for (int turn = 0; turn < 6; ++turn) {
+    for (int k = 0; turn % 2 == 0 && soc > 0.03; ++k) second(k % 60 < 40 ? -5 : -1);
+    while (turn % 2 == 1 && soc < 0.97) second(3);
+    rest();
+  }
+  return rows;
+}
+
+/// A number in a row of a CSV file.
+double value_in(const std::string& row, int column) {
+  std::size_t from = 0;
+  for (int k = 0; k < column; ++k) from = row.find(',', from) + 1;
+  return std::stod(row.substr(from));
+}
+
+TEST(Board, CountsWithTheCapacityThatItLearnsBitForBitLikeTheHost) {
+  const files::TemporaryFolder folder;
+  const std::string profile = (folder.path() / "profile.csv").string(), worn = (folder.path() / "worn.csv").string(),
+                    trace = (folder.path() / "trace.csv").string();
+  std::ofstream(profile) << profile_of_a_worn_cell();
+  ASSERT_EQ(run_tool("simulate --cell table9 --initial-soc 0.97 --with capacity_change:loss_fraction=0.22 --noise-v "
+                     "0.001 --noise-a 0.01 --seed 3 --profile " +
+                     profile + " --out " + worn)
+                .exit_code,
+            0);
+  for (const char* board : {"netduinoplus2 --scalar float", "microbit --scalar fixed"}) {
+    const ToolRun run = run_tool("replay " + worn + " --verify --trace " + trace + " --target " + board);
+    EXPECT_EQ(run.exit_code, 0) << run.err;
+    EXPECT_THAT(run.out, HasSubstr("every bit equal")) << board;
+    std::ifstream estimates(trace), truth(worn);
+    std::string estimate, row;
+    double largest = 0;
+    for (int k = 0; std::getline(estimates, estimate) && std::getline(truth, row); ++k) {
+      if (k > 25'000) largest = std::max(largest, std::abs(value_in(estimate, 1) - value_in(row, 3)));
+    }
+    EXPECT_LT(largest, 0.03) << board << ": 12 % as long as the capacity is not known";
+    EXPECT_GT(largest, 0);
+  }
 }
 
 TEST(Board, TraceIsTheHostsTrace) {

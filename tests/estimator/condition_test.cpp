@@ -34,7 +34,7 @@ struct Truck {
                                     : measurement::no_reading,
                                 2'500};
     const auto e = estimator.step(cell, s);
-    condition.update(cell, s, e, estimator.state(), limits_wanted);
+    condition.update(cell, s, e, estimator, limits_wanted);
     return e;
   }
 

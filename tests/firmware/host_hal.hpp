@@ -91,7 +91,7 @@ struct Table9Board {
   static void update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                const measurement::Sample& sample, const estimator::Estimate<float>& e,
                                bool limits_wanted) {
-    condition.update(tables(), sample, e, estimator.state(), limits_wanted);
+    condition.update(tables(), sample, e, estimator, limits_wanted);
   }
   static void update_cells(estimator::PackCells<float, Cells>& differences, const measurement::PackSample<Cells>& pack,
                            const estimator::Estimate<float>& e) {

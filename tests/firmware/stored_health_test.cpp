@@ -1,4 +1,6 @@
 // What the battery has learned of its capacity and resistance, over losses of power.
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "tests/firmware/stored_state_fixture.hpp"
@@ -41,6 +43,22 @@ TEST_F(StoredHealthTest, AWornBatteryIsWornOnEveryDay) {
     EXPECT_NEAR(health.capacity_sigma, 1.2, 0.05);
     EXPECT_NEAR(health.resistance, 134, 0.3);
     EXPECT_NEAR(health.resistance_sigma, 2.5, 0.2);
+  }
+}
+
+TEST_F(StoredHealthTest, TheReplayOfALogBeginsWithTheBitsOfTheFirmware) {
+  for (const storage::HealthRecord stored :
+       {storage::HealthRecord{823'456, 12'345, 1'000'000, 50'000}, {1'049'987, 3'049, 1'000'000, 50'000}}) {
+    day(chip_with(stored));
+    const auto sent = last<can::Health>().value();
+    estimator::SocEstimator<float> firmware, replay;
+    firmware.restore_capacity({stored.capacity_ppm, stored.capacity_sigma_ppm});
+    replay.restore_capacity({static_cast<std::int32_t>(std::lround(1e4F * sent.capacity)),
+                             static_cast<std::int32_t>(std::lround(1e4F * sent.capacity_sigma))});
+    EXPECT_EQ(replay.capacity().ratio(), firmware.capacity().ratio());
+    EXPECT_EQ(replay.capacity().variance(), firmware.capacity().variance());
+    EXPECT_EQ(replay.counted_capacity_ppm(), firmware.counted_capacity_ppm());
+    EXPECT_NEAR(1e-6 * firmware.counted_capacity_ppm(), 1e-6 * stored.capacity_ppm, 2.6e-4);
   }
 }
 

@@ -64,6 +64,12 @@ class Truck {
     time.time_high = static_cast<std::uint32_t>(time_us >> 32);
     send(time);
   }
+  void capacity(float percent, float sigma_percent) {
+    can::Health health;
+    health.capacity = percent;
+    health.capacity_sigma = sigma_percent;
+    send(health);
+  }
   void samples(int count) {
     for (int k = 0; k < count; ++k) sample();
   }
@@ -115,14 +121,33 @@ TEST(CanLogRuns, ARestartBeginsARunOfItsOwnWithItsStartAndItsTime) {
   ASSERT_EQ(sizes(runs), (std::vector<std::size_t>{300, 200}));
   for (const CanLog& run : runs) {
     EXPECT_TRUE(run.from_the_start);
-    ASSERT_TRUE(run.start.has_value());
-    EXPECT_EQ(run.start->soc_ppb, 700'000'000);
-    EXPECT_EQ(run.start->soc_sigma_ppb, 10'000'000);
+    ASSERT_TRUE(run.start.soc.has_value());
+    EXPECT_EQ(run.start.soc->soc_ppb, 700'000'000);
+    EXPECT_EQ(run.start.soc->soc_sigma_ppb, 10'000'000);
+    EXPECT_FALSE(run.start.capacity) << "not in the log";
     EXPECT_EQ(run.lost, 0U) << "a restart loses no samples";
     EXPECT_THAT(warnings(run), ::testing::IsEmpty());
     EXPECT_EQ(run.recording.time_s.front(), 0);
   }
   EXPECT_EQ(runs[1].recording.duration_s(), 199);
+}
+
+TEST(CanLogRuns, TheFirstCapacityOfARunIsThatWithWhichTheFirmwareBegan) {
+  Truck truck;
+  truck.sample();
+  truck.capacity(78.15F, 1.23F);
+  truck.samples(20);
+  truck.capacity(80, 1);
+  truck.restart();
+  truck.samples(20);
+  truck.capacity(79.95F, 0.99F);
+  const auto runs = truck.read();
+  ASSERT_EQ(runs.size(), 2U);
+  ASSERT_TRUE(runs[0].start.capacity && runs[1].start.capacity);
+  EXPECT_EQ(runs[0].start.capacity->ratio_ppm, 781'500);
+  EXPECT_EQ(runs[0].start.capacity->sigma_ppm, 12'300);
+  EXPECT_EQ(runs[1].start.capacity->ratio_ppm, 799'500);
+  EXPECT_EQ(runs[1].start.capacity->sigma_ppm, 9'900);
 }
 
 TEST(CanLogRuns, ACounterThatOverflowsAndAPauseOfTheLogAreTheSameRun) {
