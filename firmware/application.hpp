@@ -19,6 +19,7 @@
 #include "firmware/access.hpp"
 #include "firmware/board_parameters.hpp"
 #include "firmware/board_updates.hpp"
+#include "firmware/charger_frames.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/parameter_commands.hpp"
@@ -238,11 +239,10 @@ class Application {
         continue;
       }
       ++k;
-      if (!handle_session(frame, now_us) && !handle_command(frame, now_us)) vehicle_profile_.receive(frame, now_us);
+      if (!handle_session(frame, now_us) && !handle_command(frame, now_us))
+        receive_from_truck_bus(vehicle_profile_, frame, now_us);
     }
-    for (int k = 0; k < max_requests && hal::next_network_frame(frame); ++k) {
-      if (!truck_.receive(frame, now_us)) vehicle_profile_.receive(frame, now_us);
-    }
+    receive_network_frames(frame, truck_, vehicle_profile_, max_requests, now_us);
   }
 
   void handle_power(const can::Frame& frame, std::uint64_t now_us) {
