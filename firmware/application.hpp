@@ -25,6 +25,7 @@
 #include "firmware/parameter_commands.hpp"
 #include "firmware/power_requests.hpp"
 #include "firmware/progress.hpp"
+#include "firmware/pulses_of.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
@@ -38,7 +39,6 @@
 #include "hal/second_line.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
-#include "storage/persistence.hpp"
 
 namespace bms::firmware {
 
@@ -128,7 +128,6 @@ class Application {
     const StateToStore now(estimate_, condition_, cells_);
     persistence_.power_failing(now.values(), hal::calendar_s());
   }
-
   /// Stores the state when the supply falls, between two samples. The contactors are open already.
   void supply_failing() {
     const StateToStore now(estimate_, condition_, cells_);
@@ -157,6 +156,7 @@ class Application {
                                          .request_challenge = access_.drive.message()};
     telemetry_.publish(now);
     if constexpr (has_parameters) publish_parameter();
+    pulses_.template publish<Board>(now, protection_, estimator_);
     vehicle_profile_.publish(now);
   }
 
@@ -381,11 +381,11 @@ class Application {
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
+  [[no_unique_address]] PulsesOf<Board> pulses_;
   float capacity_ah_ = 0;
   TruckSide<has_ship_mode<Board>> truck_;
   Commands commands_;
-  struct NoParameters {};
-  [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;
+  [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, std::false_type> parameter_commands_;
   Requested requested_;
   Result estimate_{};
   Progress progress_;

@@ -210,6 +210,7 @@ class Protection {
   }
 
   constexpr const Decision& decision() const { return decision_; }
+  constexpr const PackQuantities<Cells>& quantities() const { return quantities_; }
   /// Balancing::take_bled_ppm().
   constexpr std::int32_t take_bled_ppm(std::size_t cell) { return balancing_.take_bled_ppm(cell); }
   /// For tests of flipped bits.

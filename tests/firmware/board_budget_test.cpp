@@ -92,6 +92,24 @@ TEST(ForkliftBudgets, HoldForAChargerBusOfItsOwnWithBothProtocols) {
   }
 }
 
+/// What the model says about pulses has tables of its own in RAM, because they are too large for the stack.
+TEST(ForkliftBudgets, HoldForACellFileThatRatesPulses) {
+  const BoardBudget budget = budget_of("stm32f405_forklift");
+  files::CellFile rated = files::read_cell("table9");
+  rated.pulses.discharge = {.for_10s_a = 18, .for_30s_a = 12};
+  rated.name = "table9_pulses";
+  const auto image = images::firmware_image(
+      "stm32f405_forklift", files::parse_cell(files::cell_text(rated), rated.name), images::Image::application);
+  const ImageSize size = size_of(image);
+  const std::uint64_t worst = stack_depth(image).worst();
+  std::printf("%zu bytes of flash, %zu of RAM, at worst %zu of stack\n",
+              static_cast<std::size_t>(size.text + size.data), static_cast<std::size_t>(size.data + size.bss),
+              static_cast<std::size_t>(worst));
+  EXPECT_LE(size.text + size.data, budget.flash);
+  EXPECT_LE(size.data + size.bss, budget.ram);
+  EXPECT_LE(worst, budget.stack);
+}
+
 // instructions as objdump prints them
 const std::string main_calls_two = R"(
 08000000 <main>:
