@@ -332,7 +332,7 @@ list(TRANSFORM no_hardware APPEND .cpp)
 bms_shared_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
   ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
 bms_shared_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp
-  ${no_hardware})
+  ${no_hardware} ${no_second_can})
 bms_shared_objects(storage -Os ${root}/firmware/storage/log.cpp ${root}/firmware/storage/persistence.cpp)
 if(NOT BMS_SHARED_OBJECTS)
   target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
