@@ -21,6 +21,8 @@
 #   BMS_CAN        slcan, or bxcan
 #   BMS_CAN_BIT_RATE, BMS_CAN_BASE, BMS_CAN_STOP  of bxcan: bit rate, identifiers of the first message and of Stop; also
 #                  as -DBMS_CAN_BIT_RATE=R
+#   BMS_CHARGER_BUS, BMS_CHARGER_BIT_RATE  can1: the charger is on the truck's bus; can2: on a bus of its own, with this
+#                  bit rate (hal/charger_bus.hpp). Also as -DBMS_CHARGER_BUS=can2
 #   BMS_PARAMETERS  true: parameters that a workshop sets over CAN (firmware/parameters/)
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
 #   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
@@ -49,8 +51,9 @@
 # IMAGE_shared compiles what an image takes.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
-set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP)
-set(of_inputs INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SLEEPS SWITCHES_OFF)
+set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP
+  CHARGER_BIT_RATE)
+set(of_inputs CHARGER_BUS INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SLEEPS SWITCHES_OFF)
 foreach(value ${of_pack_and_truck} ${of_inputs})
   if(DEFINED BMS_${value})
     set(wanted_${value} "${BMS_${value}}")  # OFF and an empty list are wishes, too
@@ -117,6 +120,16 @@ set(BMS_CANOPEN_CHARGER 10 CACHE STRING "CANopen node of the charger")
 if(NOT BMS_VEHICLE_PROFILE MATCHES "^(none|cia418|j1939|elcon)$")
   message(FATAL_ERROR "BMS_VEHICLE_PROFILE is ${BMS_VEHICLE_PROFILE}, expected none, cia418, j1939 or elcon")
 endif()
+set(charger_bus false)
+if(BMS_CHARGER_BUS STREQUAL "can2")
+  if(NOT BMS_CAN STREQUAL "bxcan" OR NOT BMS_VEHICLE_PROFILE MATCHES "^(cia418|elcon)$")
+    message(FATAL_ERROR "BMS_CHARGER_BUS is can2, which needs BMS_CAN bxcan and BMS_VEHICLE_PROFILE cia418 or elcon: "
+      "no other profile has a charger that asks for a charge")
+  endif()
+  set(charger_bus true)
+elseif(BMS_CHARGER_BUS AND NOT BMS_CHARGER_BUS STREQUAL "can1")
+  message(FATAL_ERROR "BMS_CHARGER_BUS is ${BMS_CHARGER_BUS}, expected can1 or can2")
+endif()
 option(BMS_PRODUCTION "an image for a product: nothing works without a device key of its own" OFF)
 if(NOT BMS_CURRENT_RANGE_A)
   set(BMS_CURRENT_RANGE_A 2147)  # the end of the range of a reading
@@ -139,7 +152,8 @@ bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.c
   ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
-  PARAMETERS ${BMS_PARAMETERS} INPUTS ${input_bits} OUTPUTS ${output_bits} INSULATION ${BMS_INSULATION}
+  CHARGER_BUS ${charger_bus} PARAMETERS ${BMS_PARAMETERS}
+  INPUTS ${input_bits} OUTPUTS ${output_bits} INSULATION ${BMS_INSULATION}
   CLOSES_BY_INPUTS ${closes_by_inputs} SECOND_CURRENT ${second_current_possible} TRUCK_SIDE ${truck_side})
 
 # The header generator runs on the host. Without BMS_CELL_HEADER_TOOL it is built here.
@@ -290,6 +304,17 @@ if(BMS_SAMPLES STREQUAL "bq76952" AND BMS_CELLS GREATER 16)
     target_compile_definitions(hal_isolated_bus PRIVATE BMS_ISOLATED_BUS)
   endif()
 endif()
+# The charger's own bus: the same driver on a second controller.
+set(second_can "")
+set(no_second_can "")
+if(charger_bus)
+  set(second_can hal_charger_bus)
+  bms_shared_objects(hal_charger_bus -Os ${chip}/bxcan.cpp)
+  if(NOT BMS_SHARED_OBJECTS)
+    target_compile_definitions(hal_charger_bus PRIVATE BMS_CHARGER_BUS)
+  endif()
+  set(no_second_can ${absent_hal}/charger_bus.cpp)
+endif()
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
@@ -307,7 +332,7 @@ list(TRANSFORM no_hardware APPEND .cpp)
 bms_shared_objects(hal_stream -O2 ${hal}/emulated/samples_stream.cpp ${absent_hal}/can.cpp ${absent_hal}/power_path.cpp
   ${absent_hal}/requests.cpp ${no_hardware} ${no_chain})
 bms_shared_objects(hal_hil -Os ${hal}/emulated/can_pipe.cpp ${samples_remote} ${absent_hal}/estimate_record.cpp
-  ${no_hardware})
+  ${no_hardware} ${no_second_can})
 bms_shared_objects(storage -Os ${root}/firmware/storage/log.cpp ${root}/firmware/storage/persistence.cpp)
 if(NOT BMS_SHARED_OBJECTS)
   target_compile_definitions(hal_stream PRIVATE BMS_STREAM_BLOCK=${BMS_STREAM_BLOCK})
@@ -397,8 +422,9 @@ function(bms_applications ending)
     bms_image(bms_${BMS_BOARD}${ending} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples
       ${portable} ${of_a_slot})
   else()
-    bms_image(bms_${BMS_BOARD}${ending} ${on_chip} hal_samples ${isolated_bus} ${portable} ${of_a_slot})
-    bms_image(bms_${BMS_BOARD}_remote${ending} ${on_chip} hal_remote_samples ${portable} ${of_a_slot})
+    bms_image(bms_${BMS_BOARD}${ending} ${on_chip} ${second_can} hal_samples ${isolated_bus} ${portable}
+      ${of_a_slot})
+    bms_image(bms_${BMS_BOARD}_remote${ending} ${on_chip} ${second_can} hal_remote_samples ${portable} ${of_a_slot})
   endif()
 endfunction()
 if(BMS_SLOT)
@@ -415,11 +441,14 @@ if(BMS_SLOT)
 endif()
 bms_applications("")
 if(NOT BMS_EMULATED)
-  bms_image(bms_${BMS_BOARD}_remote_product ${on_chip} hal_remote_samples ${program} product_image)
+  bms_image(bms_${BMS_BOARD}_remote_product ${on_chip} ${second_can} hal_remote_samples ${program} product_image)
   set_target_properties(bms_${BMS_BOARD}_remote_product PROPERTIES EXCLUDE_FROM_ALL ON)
   foreach(image bms_${BMS_BOARD} bms_${BMS_BOARD}_remote bms_${BMS_BOARD}_remote_product)
     # can_health() is called by debuggers and by tests/firmware
     target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)
+    if(charger_bus)
+      target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal18charger_can_healthEv)
+    endif()
   endforeach()
   set(linker_script ${root}/boards/${BMS_LOOP_BOARD}/memory.ld)
   bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})

@@ -19,11 +19,13 @@
 #include "firmware/access.hpp"
 #include "firmware/board_parameters.hpp"
 #include "firmware/board_updates.hpp"
+#include "firmware/charger_frames.hpp"
 #include "firmware/commands.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/parameter_commands.hpp"
 #include "firmware/power_requests.hpp"
 #include "firmware/progress.hpp"
+#include "firmware/pulses_of.hpp"
 #include "firmware/snapshot.hpp"
 #include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
@@ -37,7 +39,6 @@
 #include "hal/second_line.hpp"
 #include "hal/watchdog.hpp"
 #include "protection/protection.hpp"
-#include "storage/persistence.hpp"
 
 namespace bms::firmware {
 
@@ -127,7 +128,6 @@ class Application {
     const StateToStore now(estimate_, condition_, cells_);
     persistence_.power_failing(now.values(), hal::calendar_s());
   }
-
   /// Stores the state when the supply falls, between two samples. The contactors are open already.
   void supply_failing() {
     const StateToStore now(estimate_, condition_, cells_);
@@ -156,6 +156,7 @@ class Application {
                                          .request_challenge = access_.drive.message()};
     telemetry_.publish(now);
     if constexpr (has_parameters) publish_parameter();
+    pulses_.template publish<Board>(now, protection_, estimator_);
     vehicle_profile_.publish(now);
   }
 
@@ -238,11 +239,10 @@ class Application {
         continue;
       }
       ++k;
-      if (!handle_session(frame, now_us) && !handle_command(frame, now_us)) vehicle_profile_.receive(frame, now_us);
+      if (!handle_session(frame, now_us) && !handle_command(frame, now_us))
+        receive_from_truck_bus(vehicle_profile_, frame, now_us);
     }
-    for (int k = 0; k < max_requests && hal::next_network_frame(frame); ++k) {
-      if (!truck_.receive(frame, now_us)) vehicle_profile_.receive(frame, now_us);
-    }
+    receive_network_frames(frame, truck_, vehicle_profile_, max_requests, now_us);
   }
 
   void handle_power(const can::Frame& frame, std::uint64_t now_us) {
@@ -381,11 +381,11 @@ class Application {
   protection::Protection<cells> protection_;
   Telemetry<Estimator, cells> telemetry_;
   [[no_unique_address]] VehicleProfile vehicle_profile_;
+  [[no_unique_address]] PulsesOf<Board> pulses_;
   float capacity_ah_ = 0;
   TruckSide<has_ship_mode<Board>> truck_;
   Commands commands_;
-  struct NoParameters {};
-  [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, NoParameters> parameter_commands_;
+  [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, std::false_type> parameter_commands_;
   Requested requested_;
   Result estimate_{};
   Progress progress_;

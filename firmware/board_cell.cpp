@@ -3,6 +3,7 @@
 
 #include "firmware/board_pack.hpp"
 #include "firmware/board_tables.hpp"
+#include "firmware/pulse_model.hpp"
 
 namespace bms::firmware {
 
@@ -15,6 +16,15 @@ void BoardCell::update_condition(estimator::Condition<Estimator>& condition, con
 void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differences,
                              const measurement::PackSample<cells>& pack, const Estimator::Result& estimate) {
   differences.update(tables(), pack, estimate);
+}
+
+PulseModel BoardCell::pulse_model(const Estimator& estimator, const Snapshot<Estimator, cells>& now) {
+  if constexpr (std::is_same_v<Pulses, PulsePublisher>) {
+    static BoardTables with_limits_of_pulses;  // too large for the stack
+    with_limits_of_pulses = tables();
+    return firmware::pulse_model(with_limits_of_pulses, estimator, now);
+  }
+  return {};
 }
 
 const model::PlausibleRange& BoardCell::plausible() { return tables().plausible; }

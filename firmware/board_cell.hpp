@@ -15,6 +15,8 @@
 #include "firmware/elcon_profile.hpp"
 #include "firmware/j1939_profile.hpp"
 #include "firmware/messages.hpp"
+#include "firmware/pulse_currents.hpp"
+#include "firmware/pulses_of.hpp"
 #include "firmware/update_service.hpp"
 #include "hal/samples.hpp"
 #include "protection/protection.hpp"
@@ -56,6 +58,8 @@ struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_
   static constexpr bool may_stop = BMS_MAY_STOP;  ///< between samples, while the battery is parked (hal/sleep.hpp)
   static constexpr bool switches_off = BMS_SWITCHES_OFF;  ///< by itself and by a command (firmware/shelf.hpp)
 
+  using Pulses = std::conditional_t<(cells > 1 && generated::pulses.stated()), PulsePublisher, NoPulses>;
+
   static Estimator::Result step(Estimator& estimator, const measurement::Sample& sample) {
     return estimator_step(estimator, sample);
   }
@@ -65,6 +69,7 @@ struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_
                                bool limits_wanted);
   static void update_cells(estimator::PackCells<BoardScalar, cells>& differences,
                            const measurement::PackSample<cells>& pack, const Estimator::Result& estimate);
+  static PulseModel pulse_model(const Estimator& estimator, const Snapshot<Estimator, cells>& now);
   static const model::PlausibleRange& plausible();
   static const protection::ProtectionPlan& plan();
 };

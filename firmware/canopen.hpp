@@ -20,7 +20,7 @@
 
 #include "firmware/cycle.hpp"
 #include "hal/bytes.hpp"
-#include "hal/can.hpp"
+#include "hal/charger_bus.hpp"
 
 namespace bms::firmware::canopen {
 
@@ -92,7 +92,7 @@ class Node {
   }
 
   void send_heartbeat(NodeState state) const {
-    hal::can_send({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}});
+    hal::send_to_charger({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}});
   }
 
   template <class Objects>
@@ -118,7 +118,7 @@ class Node {
       answer.data[0] = 0x60;
     }
     if (abort_code != AbortCode::none) make_abort(answer, abort_code);
-    hal::can_send(answer);
+    hal::send_to_charger(answer);
   }
 
   static void make_abort(can::Frame& answer, AbortCode code) {
@@ -140,7 +140,7 @@ class Node {
       rest_.remove_prefix(sent);
       toggle_ ^= 0x10;
     }
-    hal::can_send(answer);
+    hal::send_to_charger(answer);
   }
 
   Cycle heartbeat_;

@@ -38,6 +38,7 @@
 #include "firmware/power_requests.hpp"
 #include "firmware/snapshot.hpp"
 #include "hal/accepted_frames.hpp"
+#include "hal/charger_bus.hpp"
 
 namespace bms::firmware {
 
@@ -58,7 +59,7 @@ class Cia418Profile {
   void publish(const Snapshot<Estimator, Cells>& now) {
     control_.update(now, {.present = charger_.present(now.pack.time_us)});
     update_objects(now);
-    if (!hal::can_listening()) return;
+    if (!hal::charger_listening()) return;
     const auto now_us = static_cast<std::uint32_t>(now.pack.time_us);
     node_.update_heartbeat(now_us);
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
@@ -167,7 +168,7 @@ class Cia418Profile {
     hal::put_bytes(voltage.data, 3, voltage_);
     hal::put_bytes(request.data, 0, current_requested_);
     request.data[2] = soc_;
-    for (const can::Frame& pdo : {status, voltage, request}) hal::can_send(pdo);
+    for (const can::Frame& pdo : {status, voltage, request}) hal::send_to_charger(pdo);
   }
 
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};

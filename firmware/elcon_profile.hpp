@@ -20,7 +20,7 @@
 #include "firmware/cycle.hpp"
 #include "firmware/power_requests.hpp"
 #include "firmware/snapshot.hpp"
-#include "hal/can.hpp"
+#include "hal/charger_bus.hpp"
 
 namespace bms::firmware {
 
@@ -32,7 +32,7 @@ class ElconProfile {
   template <class Estimator, std::size_t Cells>
   void publish(const Snapshot<Estimator, Cells>& now) {
     control_.update(now, {.present = present(now.pack.time_us), .output_uv = output_uv_});
-    if (hal::can_listening() && cycle_.due(static_cast<std::uint32_t>(now.pack.time_us), cycle_us)) send();
+    if (hal::charger_listening() && cycle_.due(static_cast<std::uint32_t>(now.pack.time_us), cycle_us)) send();
   }
 
   void receive(const can::Frame& frame, std::uint64_t now_us) {
@@ -61,7 +61,7 @@ class ElconProfile {
     const std::uint32_t volts = tenths(control_.target_uv()), amperes = tenths(control_.current_ua());
     const auto byte = [](std::uint32_t value) { return static_cast<std::uint8_t>(value & 0xFF); };
     const std::uint8_t control = amperes > 0 ? 0 : 1;
-    hal::can_send(
+    hal::send_to_charger(
         {command_id, 8, {byte(volts >> 8), byte(volts), byte(amperes >> 8), byte(amperes), control, 0, 0, 0}, true});
   }
 

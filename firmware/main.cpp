@@ -2,6 +2,7 @@
 #include "firmware/application.hpp"
 #include "firmware/board_cell.hpp"
 #include "hal/board_state.hpp"
+#include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
 #include "hal/retained.hpp"
 #include "hal/samples.hpp"
@@ -69,6 +70,7 @@ int main() {
   persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s(), hal::retained_ram());
   hal::calibrate(start_parameters<BoardCell>(persistence));
   hal::can_start(can_settings<BoardCell>());
+  if constexpr (hal::has_charger_bus) hal::charger_can_start();
   start_updates<BoardCell>(persistence);
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;

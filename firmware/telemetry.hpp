@@ -103,7 +103,7 @@ class Telemetry {
       (void)((std::is_same_v<Message, Known> || (++before, false)) || ...);
       return before;
     }(std::type_identity<can::Messages>());
-    static_assert(place < std::tuple_size_v<can::Messages>);
+    static_assert(place < messages);
     return sent_[place];
   }
 
@@ -216,7 +216,10 @@ class Telemetry {
 
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
-  std::array<SendState, std::tuple_size_v<can::Messages>> sent_{};  ///< a tuple takes 800 bytes of code to initialise
+  /// Of all but the last, PulseCurrents (firmware/pulse_currents.hpp); a tuple takes 800 bytes of code to initialise.
+  static constexpr std::size_t messages = std::tuple_size_v<can::Messages> - 1;
+  static_assert(std::is_same_v<std::tuple_element_t<messages, can::Messages>, can::PulseCurrents>);
+  std::array<SendState, messages> sent_{};
   StoredData stored_data_;
   estimator::EstimateHash hash_;
   protection::FaultSet published_faults_ = 0;

@@ -17,21 +17,23 @@ inline constexpr std::uint16_t stop_frame_id = 0x0A0, command_frame_id = 0x1A0, 
                                command_authority_frame_id = 0x1B1, drive_request_frame_id = 0x1B2;
 inline constexpr std::uint32_t request_code = 4;  ///< of a Command: a request for power
 
-/// Stops, commands, the frames of service sessions, requests; network management, requests to the battery's SDO server
-/// and the charger's heartbeat in an image that is a CANopen node (firmware/cia418_profile.hpp).
-inline constexpr auto request_ids = [] {
+/// Of a CANopen charger (firmware/cia418_profile.hpp): network management, requests to the battery's SDO server and the
+/// charger's heartbeat.
+inline constexpr auto charger_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
-    return std::array<std::uint16_t, 8>{stop_frame_id,
-                                        command_frame_id,
-                                        service_request_frame_id,
-                                        command_authority_frame_id,
-                                        drive_request_frame_id,
-                                        0x000,
-                                        0x600 + canopen_node,
-                                        0x700 + canopen_charger};
+    return std::array<std::uint16_t, 3>{0x000, 0x600 + canopen_node, 0x700 + canopen_charger};
   else
-    return std::array<std::uint16_t, 5>{stop_frame_id, command_frame_id, service_request_frame_id,
-                                        command_authority_frame_id, drive_request_frame_id};
+    return std::array<std::uint16_t, 0>{};
+}();
+
+/// Stops, commands, the frames of service sessions, requests; a charger's frames if it is on this bus.
+inline constexpr auto request_ids = [] {
+  constexpr std::array<std::uint16_t, 5> own{stop_frame_id, command_frame_id, service_request_frame_id,
+                                             command_authority_frame_id, drive_request_frame_id};
+  std::array<std::uint16_t, own.size() + (has_charger_bus ? 0 : charger_ids.size())> ids{};
+  std::ranges::copy(own, ids.begin());
+  if constexpr (!has_charger_bus) std::ranges::copy(charger_ids, ids.begin() + own.size());
+  return ids;
 }();
 
 /// Also the identifiers of hal/sample_frames.hpp, for an image without a measuring chain of its own.
@@ -61,9 +63,22 @@ inline constexpr auto charger_long_ids = [] {
 
 inline constexpr auto long_ids = [] {
   constexpr bool monitored = insulation_monitor == InsulationMonitor::iso175;
-  std::array<LongId, charger_long_ids.size() + (monitored ? 1 : 0)> ids{};
-  std::ranges::copy(charger_long_ids, ids.begin());
+  constexpr std::size_t of_charger = has_charger_bus ? 0 : charger_long_ids.size();
+  std::array<LongId, of_charger + (monitored ? 1 : 0)> ids{};
+  std::copy_n(charger_long_ids.begin(), of_charger, ids.begin());
   if constexpr (monitored) ids.back() = {iso175_frame_id, 0x1FFF'FFFF};
+  return ids;
+}();
+
+/// Received from the charger's own bus (hal/charger_bus.hpp), and there only.
+inline constexpr auto charger_bus_ids = [] {
+  std::array<std::uint16_t, has_charger_bus ? charger_ids.size() : 0> ids{};
+  std::copy_n(charger_ids.begin(), ids.size(), ids.begin());
+  return ids;
+}();
+inline constexpr auto charger_bus_long_ids = [] {
+  std::array<LongId, has_charger_bus ? charger_long_ids.size() : 0> ids{};
+  std::copy_n(charger_long_ids.begin(), ids.size(), ids.begin());
   return ids;
 }();
 

@@ -5,9 +5,11 @@
 
 namespace bms::hal {
 
-/// Takes the controller off the bus, if for quiet_us neither a frame nor an acknowledgement of a node has come, and
-/// none is on the wire. can_receive() and can_listening() take it on the bus again, where it sends nothing until a
-/// frame arrives or a second has passed.
+/// Returns true if for quiet_us neither a frame nor an acknowledgement of a node has come.
+bool can_quiet(std::uint64_t quiet_us);
+
+/// Takes the controller off the bus, if it is quiet and no frame is on the wire. can_receive() and can_listening() take
+/// it on the bus again, where it sends nothing until a frame arrives or a second has passed.
 bool can_suspend(std::uint64_t quiet_us);
 
 /// A node has begun a frame: the controller stays on the bus from now on for as long as a frame would keep it there.

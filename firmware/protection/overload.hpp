@@ -101,6 +101,24 @@ class OverloadIntegral {
     add(heat_us_, rates.heat, step_us, most_us);
     add(cold_us_, rates.cold, step_us, most_us);
   }
+  /// The largest current, as times_256 up to that of the larger rating, that fills no integral in duration_us from now.
+  constexpr std::int32_t carries_256ths(const OverloadPlan& plan, bool holds, std::uint32_t duration_us) const {
+    const auto fits = [&](std::int32_t times_256) {
+      const OverloadRates rates = overload_rates(plan, times_256, holds);
+      const auto after_us = [&](std::int32_t us, std::int64_t rate) { return us + ((rate * duration_us) >> 16); };
+      return after_us(time_us_, rates.time) <= full_overload_us && after_us(heat_us_, rates.heat) <= full_overload_us &&
+             after_us(cold_us_, rates.cold) <= full_overload_us;
+    };
+    std::int32_t low = 0;
+    for (std::int32_t high = std::max(plan.for_30s_256ths, plan.for_10s_256ths); low < high;) {
+      const std::int32_t middle = (low + high + 1) / 2;
+      if (fits(middle))
+        low = middle;
+      else
+        high = middle - 1;
+    }
+    return low;
+  }
   /// Value that the row compares [us].
   constexpr std::int32_t value_us() const { return std::max({time_us_, heat_us_, cold_us_}); }
 

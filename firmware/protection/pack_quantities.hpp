@@ -87,6 +87,8 @@ class PackQuantities {
     update_current(sample.current_ua, step_us, q);
   }
 
+  constexpr const OverloadIntegral& charge_overload() const { return charge_overload_; }
+  constexpr const OverloadIntegral& discharge_overload() const { return discharge_overload_; }
   /// Sum of all cells of the last sample [uV], or measurement::no_reading.
   constexpr std::int32_t sum_uv() const { return sum_uv_; }
 

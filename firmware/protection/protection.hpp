@@ -210,6 +210,7 @@ class Protection {
   }
 
   constexpr const Decision& decision() const { return decision_; }
+  constexpr const PackQuantities<Cells>& quantities() const { return quantities_; }
   /// Balancing::take_bled_ppm().
   constexpr std::int32_t take_bled_ppm(std::size_t cell) { return balancing_.take_bled_ppm(cell); }
   /// For tests of flipped bits.
@@ -309,10 +310,23 @@ class Protection {
     at(q, Quantity::not_closed) = seen.not_closed;
     at(q, Quantity::integrity_error) = !intact || inputs.board_fault;
     at(q, Quantity::supply_dips) = inputs.supply_dip;
+    if constexpr (Cells > 1) hold_temperatures(q);
     decision_.raised = monitor_.update(q, step_us, evaluated_us_, inputs.clear, !closed_once_);
     decision_.faults = monitor_.active();
     decision_.latched = monitor_.latched();
     decision_.first = monitor_.first();
+  }
+
+  /// While one of several temperatures is missing, its cell may be the hot or the cold one: it counts as not yet good
+  /// again for the faults that are active. The other readings still raise faults.
+  constexpr void hold_temperatures(Quantities& q) const {
+    if (at(q, Quantity::temperatures_missing) <= 0) return;  // no_reading is less
+    for (const Rule& r : plan_->rules) {
+      if (!has(monitor_.active(), r.fault) || at(q, r.quantity) == measurement::no_reading) continue;
+      std::int32_t& value = at(q, r.quantity);
+      if (r.quantity == Quantity::highest_cdegc) value = std::max(value, r.release + 1);
+      if (r.quantity == Quantity::lowest_cdegc) value = std::min(value, r.release - 1);
+    }
   }
 
   constexpr void update_allowed_currents(const Quantities& q, const PackEstimate<Cells>& estimate, bool no_charge,

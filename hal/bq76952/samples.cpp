@@ -15,6 +15,7 @@
 #include "hal/bq76952/pack_readings.hpp"
 #include "hal/bq76952/stack.hpp"
 #include "hal/can.hpp"
+#include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
 #include "hal/frame_dispatch.hpp"
@@ -78,6 +79,7 @@ std::uint32_t acquired_us = 0;
 bool started = false;
 
 void receive_frames() {
+  charger_bus_service();
   can::Frame frame;
   while (can_receive(frame)) dispatch_frame(frame);
 }

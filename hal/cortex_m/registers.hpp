@@ -21,6 +21,7 @@ inline Register& nvic_icer0() { return at<0xE000E180>(); }
 inline Register& nvic_icpr0() { return at<0xE000E280>(); }
 inline Register& nvic_iser1() { return at<0xE000E104>(); }
 inline Register& nvic_icer1() { return at<0xE000E184>(); }
+inline Register& nvic_icpr1() { return at<0xE000E284>(); }
 
 // system control [B3.2]
 inline Register& scb_icsr() { return at<0xE000ED04>(); }

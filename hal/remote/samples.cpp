@@ -8,6 +8,7 @@
 #include "hal/samples.hpp"
 #include "hal/accepted_frames.hpp"
 #include "hal/can.hpp"
+#include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
 #include "hal/frame_dispatch.hpp"
 #include "hal/power_path.hpp"
@@ -31,6 +32,7 @@ bool silent = false;                                     ///< the last sample ha
 
 const measurement::PackSample<pack_cells>* next_sample() {
   while (true) {
+    charger_bus_service();
     can::Frame frame;
     while (can_receive(frame)) {
       if (!dispatch_frame(frame) || !frames.receive(frame))

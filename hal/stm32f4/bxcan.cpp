@@ -1,5 +1,8 @@
 // CAN1 on PB8 (RX) and PB9 (TX), alternate function 9 (datasheet, table 9). Registers: RM0090, 32.9.
 //
+// An image with two buses has this file twice: with BMS_CHARGER_BUS it is CAN2 on PB12 (RX) and PB13 (TX), and the
+// functions are those of hal/charger_bus.hpp. Nothing is common but the filters.
+//
 // Transmission: three mailboxes, which the controller sends by identifier (TXFP = 0), and a queue of 32 frames in the
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
 // queue. Two frames with the same identifier are never in mailboxes together, because the controller would send them by
@@ -22,26 +25,19 @@
 #include <span>
 #include <utility>
 
-#include "hal/accepted_frames.hpp"
 #include "hal/bxcan/bit_timing.hpp"
-#include "hal/bxcan/filter_banks.hpp"
 #include "hal/bxcan/transmit_queue.hpp"
 #include "hal/can.hpp"
 #include "hal/can_suspend.hpp"
 #include "hal/clock.hpp"
+#include "hal/stm32f4/can_controller.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
-#include "hal/stm32f4/registers.hpp"
-#include "hal/update_frames.hpp"
 
 namespace bms::hal {
 
 namespace {
 
 using namespace stm32f4;
-
-static_assert(bxcan::fits(with_updates(request_ids), long_ids.size()) &&
-                  bxcan::fits(with_updates(request_and_sample_ids), long_ids.size()),
-              "too many identifiers for the acceptance filters of CAN1");
 
 struct Rate {
   std::uint32_t bit_rate, btr, phase_timeout_us;
@@ -53,21 +49,13 @@ consteval Rate rate(std::uint32_t bit_rate) {
           std::max<std::uint32_t>(100'000, recovery_us + margin_us)};
 }
 /// That of the build first: it is used if the settings have another one that is not here.
-constexpr std::array rates{rate(can_bit_rate), rate(125'000), rate(250'000), rate(500'000), rate(1'000'000)};
+constexpr std::array rates{rate(settings_of_bus.bit_rate), rate(125'000), rate(250'000), rate(500'000),
+                           rate(1'000'000)};
 const Rate* timing = &rates[0];
-Identifiers identifiers{can_settings_of_build};
+Identifiers identifiers{settings_of_bus};
 
 constexpr std::uint64_t no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
-
-constexpr std::uint32_t mcr_inrq = 1U << 0, mcr_rflm = 1U << 3, mcr_reset = 1U << 15, msr_inak = 1U << 0;
-constexpr std::uint32_t rf_pending = 3U, rf_overrun = 1U << 4, rf_release = 1U << 5;
-constexpr std::uint32_t ier_tme = 1U << 0, ier_fmp0 = 1U << 1, ier_fov0 = 1U << 3;
-constexpr std::uint32_t esr_warning = 1U << 0, esr_passive = 1U << 1, esr_bus_off = 1U << 2;
-constexpr std::uint32_t transmit_request = 1U, extended = 4U;
-constexpr std::uint32_t finished(std::uint32_t box) { return 1U << (8 * box); }
-constexpr std::uint32_t succeeded(std::uint32_t box) { return 2U << (8 * box); }
-constexpr std::uint32_t abort_request(std::uint32_t box) { return 0x80U << (8 * box); }
 
 // ---- transmission: shared with the interrupt ----
 
@@ -76,7 +64,7 @@ struct Mailbox {
   bool taken = false, unwanted = false;
 };
 std::array<Mailbox, 3> mailboxes;
-bxcan::TransmitQueue<32> queue;
+bxcan::TransmitQueue<queue_frames> queue;
 std::uint32_t next_number = 0;
 std::atomic<std::uint32_t> sent{0}, dropped{0};
 
@@ -88,12 +76,12 @@ void count(std::atomic<std::uint32_t>& counter, std::uint32_t more = 1) {
 class TransmitInterruptLock {
  public:
   TransmitInterruptLock() {
-    nvic_icer0() = 1U << can1_tx_interrupt;
+    nvic_icer<tx_interrupt>() = bit_of(tx_interrupt);
     asm volatile("dsb\n isb" ::: "memory");
   }
   ~TransmitInterruptLock() {
     asm volatile("" ::: "memory");
-    nvic_iser0() = 1U << can1_tx_interrupt;
+    nvic_iser<tx_interrupt>() = bit_of(tx_interrupt);
   }
   TransmitInterruptLock(const TransmitInterruptLock&) = delete;
   TransmitInterruptLock& operator=(const TransmitInterruptLock&) = delete;
@@ -101,9 +89,9 @@ class TransmitInterruptLock {
 
 void take_back_finished() {
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
-    const std::uint32_t status = can1_tsr();
+    const std::uint32_t status = can_tsr();
     if ((status & finished(k)) == 0) continue;
-    can1_tsr() = finished(k);
+    can_tsr() = finished(k);
     Mailbox& box = mailboxes[k];
     if (!box.taken) continue;
     if ((status & succeeded(k)) != 0)
@@ -123,7 +111,7 @@ bool in_a_mailbox(const can::Frame& frame) {
 
 void load(std::uint32_t k, const bxcan::WaitingFrame& waiting) {
   mailboxes[k] = {waiting, true, false};
-  CanMailbox& box = can1_transmit_mailbox(k);
+  CanMailbox& box = can_transmit_mailbox(k);
   const can::Frame& frame = waiting.frame;
   box.length_and_time = frame.length < 8 ? frame.length : 8;
   box.data_low = get_bytes<std::uint32_t>(frame.data, 0);
@@ -139,7 +127,7 @@ void make_room_for(const bxcan::WaitingFrame& waiting) {
     if (bxcan::arbitration(mailboxes[k].waiting.frame) > bxcan::arbitration(mailboxes[least].waiting.frame)) least = k;
   }
   if (bxcan::arbitration(mailboxes[least].waiting.frame) <= bxcan::arbitration(waiting.frame)) return;
-  can1_tsr() = abort_request(least);
+  can_tsr() = abort_request(least);
 }
 
 void refill() {
@@ -161,7 +149,7 @@ void drop_waiting_frames() {
   for (std::uint32_t k = 0; k < mailboxes.size(); ++k) {
     if (!mailboxes[k].taken) continue;
     mailboxes[k].unwanted = true;
-    can1_tsr() = abort_request(k);
+    can_tsr() = abort_request(k);
   }
 }
 
@@ -172,7 +160,7 @@ bool frames_waiting() {
 
 // ---- reception: one writer (the interrupt), one reader ----
 
-std::array<can::Frame, 64> ring;
+std::array<can::Frame, ring_frames> ring;
 std::atomic<std::uint32_t> received{0}, taken{0}, lost{0}, overruns{0};
 
 // ---- state of the bus ----
@@ -182,40 +170,47 @@ Phase phase = Phase::off;
 std::uint64_t phase_since_us = 0, progress_us = 0, paused_since_us = 0, active_us = 0;
 std::uint32_t rest_us = first_rest_us, bus_offs = 0, failed_starts = 0, seen_sent = 0, seen_received = 0;
 bool paused = false, suspended = false;
+[[maybe_unused]] bool filters_set = false;
 
 void enter(Phase next) {
   phase = next;
   phase_since_us = now_us();
 }
 
-void configure() {
-  can1_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
-  can1_btr() = timing->btr;
-  can1_fmr() = can1_fmr() | 1U;
-  const auto accepted = accepted_ids();
+/// Of two buses those of this one, and once: FINIT stops the reception of both.
+void set_filters() {
+  if (has_charger_bus && std::exchange(filters_set, true)) return;
+  can_fmr() = can_fmr() | 1U;
+  const auto accepted = ids_of_bus();
   std::array<std::uint16_t, bxcan::max_ids> on_the_bus;
   for (std::size_t k = 0; k < accepted.size(); ++k) on_the_bus[k] = identifiers.on_the_bus(accepted[k]);
   const auto ids = std::span<const std::uint16_t>(on_the_bus).first(accepted.size());
   const std::size_t banks = bxcan::bank_count(ids);
-  const std::uint32_t lists = (1U << banks) - 1, masks = ((1U << long_ids.size()) - 1) << banks;
-  can1_fa1r() = 0;
-  can1_fs1r() = masks;  // 32 bits; the others 16
-  can1_fm1r() = lists;
-  can1_ffa1r() = 0;  // FIFO 0
+  const std::uint32_t lists = (1U << banks) - 1, masks = ((1U << long_ids_of_bus.size()) - 1) << banks;
+  set_own_banks(can_fa1r(), 0);
+  set_own_banks(can_fs1r(), masks);  // 32 bits; the others 16
+  set_own_banks(can_fm1r(), lists);
+  set_own_banks(can_ffa1r(), 0);  // FIFO 0
   const auto set = [](std::size_t k, const bxcan::FilterBank& bank) {
-    can1_filter_bank(static_cast<std::uint32_t>(k)).fr1 = bank.fr1;
-    can1_filter_bank(static_cast<std::uint32_t>(k)).fr2 = bank.fr2;
+    can_filter_bank(first_bank + static_cast<std::uint32_t>(k)).fr1 = bank.fr1;
+    can_filter_bank(first_bank + static_cast<std::uint32_t>(k)).fr2 = bank.fr2;
   };
   for (std::size_t k = 0; k < banks; ++k) set(k, bxcan::filter_bank(ids, k));
-  for (std::size_t k = 0; k < long_ids.size(); ++k)
-    set(banks + k, bxcan::long_filter_bank(long_ids[k].id, long_ids[k].mask));
-  can1_fa1r() = lists | masks;
-  can1_fmr() = can1_fmr() & ~1U;
-  can1_ier() = ier_tme | ier_fmp0 | ier_fov0;
+  for (std::size_t k = 0; k < long_ids_of_bus.size(); ++k)
+    set(banks + k, bxcan::long_filter_bank(long_ids_of_bus[k].id, long_ids_of_bus[k].mask));
+  set_own_banks(can_fa1r(), lists | masks);
+  can_fmr() = can_fmr() & ~1U;
+}
+
+void configure() {
+  can_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
+  can_btr() = timing->btr;
+  set_filters();
+  can_ier() = ier_tme | ier_fmp0 | ier_fov0;
 }
 
 void ask_for_initialisation() {
-  can1_mcr() = mcr_inrq | mcr_rflm;  // also leaves sleep mode
+  can_mcr() = mcr_inrq | mcr_rflm;  // also leaves sleep mode
   enter(Phase::entering);
 }
 
@@ -224,11 +219,11 @@ void abandon_phase() {
   ++failed_starts;
   if (phase == Phase::entering) {
     const TransmitInterruptLock lock;
-    can1_mcr() = mcr_reset;
+    can_mcr() = mcr_reset;
     for (Mailbox& box : mailboxes) count(dropped, box.taken ? 1 : 0);
     mailboxes = {};
   } else {
-    can1_mcr() = mcr_inrq | mcr_rflm;
+    can_mcr() = mcr_inrq | mcr_rflm;
   }
   enter(Phase::resting);
 }
@@ -253,7 +248,7 @@ void watch_transmission() {
 
 void service() {
   const std::uint64_t elapsed = now_us() - phase_since_us;
-  const bool initialising = (can1_msr() & msr_inak) != 0, bus_off = (can1_esr() & esr_bus_off) != 0;
+  const bool initialising = (can_msr() & msr_inak) != 0, bus_off = (can_esr() & esr_bus_off) != 0;
   switch (phase) {
     case Phase::off:
       return;
@@ -267,7 +262,7 @@ void service() {
         return;
       }
       configure();
-      can1_mcr() = mcr_rflm;
+      can_mcr() = mcr_rflm;
       return enter(Phase::joining);
     case Phase::joining:
       if (!initialising && !bus_off) {
@@ -285,45 +280,50 @@ void service() {
   }
 }
 
-bool on_the_bus() { return phase == Phase::on && (can1_esr() & esr_bus_off) == 0; }
+[[gnu::always_inline]] inline bool quiet(std::uint64_t quiet_us) {
+  return phase == Phase::on && paused && now_us() - active_us >= quiet_us;
+}
+
+bool on_the_bus() { return phase == Phase::on && (can_esr() & esr_bus_off) == 0; }
 
 }  // namespace
 
-void can_start(const CanSettings& settings) {
+void BMS_OF_BUS(can_start)(const CanSettings& settings) {
   identifiers = Identifiers(settings);
   for (const Rate& r : rates) {
     if (r.bit_rate == settings.bit_rate) timing = &r;
   }
   if (clocks().core_hz != crystal_core_hz) return;
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;
-  rcc_apb1enr() = rcc_apb1enr() | 1U << 25;
-  gpiob_pupdr() = (gpiob_pupdr() & ~(3U << 16)) | 1U << 16;  // recessive if there is no transceiver
-  gpiob_afrh() = (gpiob_afrh() & ~255U) | 0x99U;
-  gpiob_moder() = (gpiob_moder() & ~(15U << 16)) | 10U << 16;
-  nvic_priority(can1_tx_interrupt) = communication_priority;
-  nvic_priority(can1_rx0_interrupt) = communication_priority;
-  nvic_iser0() = 1U << can1_tx_interrupt | 1U << can1_rx0_interrupt;
+  rcc_apb1enr() = rcc_apb1enr() | can_clocks;
+  gpiob_pupdr() = (gpiob_pupdr() & ~(3U << two_pins)) | 1U << two_pins;  // recessive if there is no transceiver
+  gpiob_afrh() = (gpiob_afrh() & ~(255U << four_bits)) | 0x99U << four_bits;
+  gpiob_moder() = (gpiob_moder() & ~(15U << two_pins)) | 10U << two_pins;
+  nvic_priority(tx_interrupt) = communication_priority;
+  nvic_priority(rx0_interrupt) = communication_priority;
+  enable_interrupts();
   ask_for_initialisation();
 }
 
-bool can_listening() {
+bool BMS_OF_BUS(can_listening)() {
   service();
   return on_the_bus() && !paused;
 }
 
-bool can_suspend(std::uint64_t quiet_us) {
-  if (phase != Phase::on || !paused || now_us() - active_us < quiet_us) return false;
+bool BMS_OF_BUS(can_quiet)(std::uint64_t quiet_us) { return quiet(quiet_us); }
+bool BMS_OF_BUS(can_suspend)(std::uint64_t quiet_us) {
+  if (!quiet(quiet_us)) return false;
   ask_for_initialisation();
   suspended = true;
-  while ((can1_msr() & msr_inak) == 0 && now_us() - phase_since_us < 50) continue;
-  const bool idle = (can1_msr() & msr_inak) != 0;
-  if (!idle) can_active();  // a frame is on the wire
+  while ((can_msr() & msr_inak) == 0 && now_us() - phase_since_us < 50) continue;
+  const bool idle = (can_msr() & msr_inak) != 0;
+  if (!idle) BMS_OF_BUS(can_active)();  // a frame is on the wire
   return idle;
 }
 
-void can_active() { active_us = now_us(); }
+void BMS_OF_BUS(can_active)() { active_us = now_us(); }
 
-bool can_send(const can::Frame& frame) {
+bool BMS_OF_BUS(can_send)(const can::Frame& frame) {
   const TransmitInterruptLock lock;
   if (!on_the_bus() || paused) {
     count(dropped);
@@ -335,7 +335,7 @@ bool can_send(const can::Frame& frame) {
   return kept;
 }
 
-bool can_receive(can::Frame& frame) {
+bool BMS_OF_BUS(can_receive)(can::Frame& frame) {
   service();
   for (std::uint32_t at = taken.load(std::memory_order_relaxed); at != received.load(std::memory_order_acquire);) {
     frame = ring[at % ring.size()];
@@ -345,8 +345,8 @@ bool can_receive(can::Frame& frame) {
   return false;
 }
 
-CanHealth can_health() {
-  const std::uint32_t esr = can1_esr();
+CanHealth BMS_OF_BUS(can_health)() {
+  const std::uint32_t esr = can_esr();
   const auto state = [&] {
     if ((esr & esr_bus_off) != 0) return CanState::bus_off;
     if (phase != Phase::on) return CanState::starting;
@@ -367,17 +367,17 @@ CanHealth can_health() {
 
 }  // namespace bms::hal
 
-extern "C" void can1_tx_interrupt() { bms::hal::refill(); }
+extern "C" void BMS_INTERRUPT_OF_BUS(tx_interrupt)() { bms::hal::refill(); }
 
-extern "C" void can1_rx0_interrupt() {
+extern "C" void BMS_INTERRUPT_OF_BUS(rx0_interrupt)() {
   using namespace bms::hal;
-  const std::uint32_t status = stm32f4::can1_rf0r();
+  const std::uint32_t status = stm32f4::can_rf0r();
   if ((status & rf_overrun) != 0) {
-    stm32f4::can1_rf0r() = rf_overrun;
+    stm32f4::can_rf0r() = rf_overrun;
     count(overruns);
   }
   if ((status & rf_pending) == 0) return;
-  const stm32f4::CanMailbox& box = stm32f4::can1_receive_fifo_0();
+  const stm32f4::CanMailbox& box = stm32f4::can_receive_fifo_0();
   const std::uint32_t length = box.length_and_time & 15U;
   const bool is_long = (box.identifier & extended) != 0;
   bms::can::Frame frame{is_long ? box.identifier >> 3 : box.identifier >> 21,
@@ -386,8 +386,8 @@ extern "C" void can1_rx0_interrupt() {
                         is_long};
   put_bytes<std::uint32_t>(frame.data, 0, box.data_low);
   put_bytes<std::uint32_t>(frame.data, 4, box.data_high);
-  stm32f4::can1_rf0r() = rf_release;
-  for (int patience = 0; patience < 16 && (stm32f4::can1_rf0r() & rf_release) != 0; ++patience) {
+  stm32f4::can_rf0r() = rf_release;
+  for (int patience = 0; patience < 16 && (stm32f4::can_rf0r() & rf_release) != 0; ++patience) {
   }
   const std::uint32_t at = received.load(std::memory_order_relaxed);
   if (at - taken.load(std::memory_order_acquire) == ring.size()) {

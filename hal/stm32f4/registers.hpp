@@ -92,29 +92,9 @@ inline Register& usart1_brr() { return at<0x40011008>(); }
 inline Register& usart1_cr1() { return at<0x4001100C>(); }
 inline constexpr unsigned usart1_interrupt = 37;
 
-// CAN1 [32.9]
-inline Register& can1_mcr() { return at<0x40006400>(); }
-inline Register& can1_msr() { return at<0x40006404>(); }
-inline Register& can1_tsr() { return at<0x40006408>(); }
-inline Register& can1_rf0r() { return at<0x4000640C>(); }
-inline Register& can1_ier() { return at<0x40006414>(); }
-inline Register& can1_esr() { return at<0x40006418>(); }
-inline Register& can1_btr() { return at<0x4000641C>(); }
-inline Register& can1_fmr() { return at<0x40006600>(); }
-inline Register& can1_fm1r() { return at<0x40006604>(); }
-inline Register& can1_fs1r() { return at<0x4000660C>(); }
-inline Register& can1_ffa1r() { return at<0x40006614>(); }
-inline Register& can1_fa1r() { return at<0x4000661C>(); }
-struct CanMailbox {
-  Register identifier, length_and_time, data_low, data_high;  // TIxR or RIxR, and so on
-};
-inline CanMailbox& can1_transmit_mailbox(std::uint32_t k) { return reinterpret_cast<CanMailbox*>(0x40006580)[k]; }
-inline CanMailbox& can1_receive_fifo_0() { return *reinterpret_cast<CanMailbox*>(0x400065B0); }
-struct CanFilterBank {
-  Register fr1, fr2;
-};
-inline CanFilterBank& can1_filter_bank(std::uint32_t k) { return reinterpret_cast<CanFilterBank*>(0x40006640)[k]; }
-inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20;
+// CAN1, CAN2 [32.9]; their registers: can_controller.hpp
+inline constexpr unsigned can1_tx_interrupt = 19, can1_rx0_interrupt = 20, can2_tx_interrupt = 63,
+                          can2_rx0_interrupt = 64;
 
 // external interrupts [12.3], their ports [9.2]
 inline Register& syscfg_exticr2() { return at<0x4001380C>(); }

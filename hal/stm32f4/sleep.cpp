@@ -5,7 +5,10 @@
 //   a falling edge of CAN RX (PB8): its frame is lost
 //   the supply detector, a lost contact and the coil supply, as always
 //
-// PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230).
+// PB12 is high meanwhile: the transceiver only listens (RS of an SN65HVD230). With a bus of its own for the charger it
+// is PB0 for both transceivers, and a falling edge of CAN2 RX (PB12) ends the stop, too. It is watched in the stop
+// only, because its interrupt is that of the auxiliary contacts: of a charger that repeats its frame each second the
+// second one may be lost as well.
 //
 // The CAN controller is off the bus from before the stop until the next frames are read, and joins eleven recessive
 // bits later. An edge of CAN RX in all this time means that a node talks: the chip stays awake and receives its next
@@ -19,6 +22,7 @@
 #include <utility>
 
 #include "hal/can_suspend.hpp"
+#include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
 #include "hal/power.hpp"
 #include "hal/stm32f4/clock_stop.hpp"
@@ -124,7 +128,12 @@ std::uint64_t stop() {
   return stopped_us;
 }
 
-constexpr std::uint32_t only_listens = 1U << 12;  // PB12
+constexpr std::uint32_t listen_pin = has_charger_bus ? 0 : 12;  // of port B
+constexpr std::uint32_t only_listens = 1U << listen_pin;
+constexpr std::uint32_t charger_line = 1U << 12;  // EXTI12: PB12
+constexpr std::uint32_t contacts_interrupt = 1U << (exti15_10_interrupt - 32);
+bool charger_stirs = false;     ///< in the last stop
+bool contacts_watched = false;  ///< their interrupt was on before
 
 /// Call while the controller is on the bus. From now on the line keeps an edge; its interrupt is off.
 void watch_bus() {
@@ -135,18 +144,39 @@ void watch_bus() {
   exti_pr() = receive_line;
 }
 
+/// The contacts of the same interrupt may be absent: then it has no handler, and only wakes.
+void listen_to_charger() {
+  syscfg_exticr4() = (syscfg_exticr4() & ~15U) | 1U;  // line 12: port B
+  exti_ftsr() = exti_ftsr() | charger_line;
+  exti_pr() = charger_line;
+  exti_imr() = exti_imr() | charger_line;
+  contacts_watched = (nvic_iser1() & contacts_interrupt) != 0;
+  nvic_iser1() = contacts_interrupt;
+}
+
+/// A contact that has moved keeps its flag, and so its interrupt is pending again.
+void end_listening_to_charger() {
+  charger_stirs = (exti_pr() & charger_line) != 0;
+  exti_imr() = exti_imr() & ~charger_line;
+  exti_pr() = charger_line;
+  if (!contacts_watched) nvic_icer1() = contacts_interrupt;
+  nvic_icpr1() = contacts_interrupt;
+}
+
 /// An edge since watch_bus() wakes the core at once. Interrupts are masked: those of the lines have no handler.
 void listen() {
   gpiob_bsrr() = only_listens;
-  gpiob_moder() = (gpiob_moder() & ~(3U << 24)) | 1U << 24;
+  gpiob_moder() = (gpiob_moder() & ~(3U << 2 * listen_pin)) | 1U << 2 * listen_pin;
   exti_rtsr() = exti_rtsr() | timer_line;
   exti_pr() = timer_line;
   exti_imr() = exti_imr() | timer_line;
   nvic_icpr0() = interrupts;  // what is left; a line with its flag set is pending again
   nvic_iser0() = interrupts;
+  if constexpr (has_charger_bus) listen_to_charger();
 }
 
 void end_listening() {
+  if constexpr (has_charger_bus) end_listening_to_charger();
   gpiob_bsrr() = only_listens << 16;
   exti_imr() = exti_imr() & ~timer_line;
   nvic_icer0() = interrupts;
@@ -156,14 +186,17 @@ void end_listening() {
 }  // namespace
 
 void set_parked(bool now) { parked = now; }
-bool bus_stirs() { return off_the_bus && (exti_pr() & receive_line) != 0; }
+bool bus_stirs() { return off_the_bus && ((exti_pr() & receive_line) != 0 || (has_charger_bus && charger_stirs)); }
 
 void rest_until(std::uint64_t due_us) {
   const std::uint64_t now = now_us();
   if (!parked || clock_died || due_us < now + start_us + shortest_us || !clock_runs()) return wait_for_interrupt();
   if (std::exchange(off_the_bus, false) && (exti_pr() & receive_line) != 0) can_active();
+  if (has_charger_bus && std::exchange(charger_stirs, false)) charger_can_active();
   watch_bus();
+  if (has_charger_bus && !charger_can_quiet(silence_before_stop_us)) return wait_for_interrupt();
   if (!can_suspend(silence_before_stop_us)) return wait_for_interrupt();
+  if (has_charger_bus && !charger_can_suspend(silence_before_stop_us)) return wait_for_interrupt();
   off_the_bus = true;
   const auto before = day_ticks();
   const std::uint64_t before_us = now_us();

@@ -1,5 +1,6 @@
 #include "hal/cortex_m/vectors.hpp"
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake: has_charger_bus
 #include "hal/stm32f4/registers.hpp"
 
 extern "C" {
@@ -10,6 +11,8 @@ void clock_interrupt();
 [[gnu::weak, gnu::naked]] void usart1_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_tx_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void can1_rx0_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void can2_tx_interrupt() { asm volatile("b fault_handler"); }
+[[gnu::weak, gnu::naked]] void can2_rx0_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void pvd_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void exti4_interrupt() { asm volatile("b fault_handler"); }
 [[gnu::weak, gnu::naked]] void exti15_10_interrupt() { asm volatile("b fault_handler"); }
@@ -42,6 +45,10 @@ constexpr auto table() {
   all.serve(cortex_m::core_exceptions + stm32f4::usart1_interrupt, ::usart1_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);
+  if constexpr (has_charger_bus) {
+    all.serve(cortex_m::core_exceptions + stm32f4::can2_tx_interrupt, ::can2_tx_interrupt);
+    all.serve(cortex_m::core_exceptions + stm32f4::can2_rx0_interrupt, ::can2_rx0_interrupt);
+  }
   all.serve(cortex_m::core_exceptions + stm32f4::pvd_interrupt, ::pvd_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::exti4_interrupt, ::exti4_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::exti15_10_interrupt, ::exti15_10_interrupt);

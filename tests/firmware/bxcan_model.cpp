@@ -484,14 +484,17 @@ void BxcanModel::receive(const WireFrame& f) {
 
 /// Acceptance filters, 32.7.4, figure 342. Active only outside FINIT.
 bool BxcanModel::accepted(const WireFrame& f) const {
-  if ((fmr_ & 1) != 0) return false;
+  const BxcanModel& filters = filters_of != nullptr ? *filters_of : *this;
+  if ((filters.fmr_ & 1) != 0) return false;
   const std::uint32_t base_id = f.extended ? f.id >> 18 : f.id;
   const std::uint32_t wide = base_id << 21 | (f.extended ? (f.id & 0x3FFFF) << 3 | 4U : 0U) | (f.remote ? 2U : 0U);
   const std::uint32_t narrow = base_id << 5 | (f.remote ? 16U : 0U) | (f.extended ? 8U | (f.id >> 15 & 7) : 0U);
-  for (std::uint32_t k = 0; k < 14; ++k) {
-    if ((fa1r_ >> k & 1) == 0 || (ffa1r_ >> k & 1) != 0) continue;
-    const bool list = (fm1r_ >> k & 1) != 0, single = (fs1r_ >> k & 1) != 0;
-    const std::uint32_t a = banks_[2 * k], b = banks_[2 * k + 1];
+  const std::uint32_t first_of_can2 = filters.fmr_ >> 8 & 63;  // CAN2SB
+  const std::uint32_t from = filters_of != nullptr ? first_of_can2 : 0, to = filters_of != nullptr ? 28 : first_of_can2;
+  for (std::uint32_t k = from; k < to; ++k) {
+    if ((filters.fa1r_ >> k & 1) == 0 || (filters.ffa1r_ >> k & 1) != 0) continue;
+    const bool list = (filters.fm1r_ >> k & 1) != 0, single = (filters.fs1r_ >> k & 1) != 0;
+    const std::uint32_t a = filters.banks_[2 * k], b = filters.banks_[2 * k + 1];
     if (single && (list ? wide == (a & ~1U) || wide == (b & ~1U) : (wide & b & ~1U) == (a & b & ~1U))) return true;
     if (single) continue;
     for (const std::uint32_t pair : {a, b}) {

@@ -53,6 +53,9 @@ class BxcanModel {
   bool transmit_interrupt() const;
   bool receive_interrupt() const;
 
+  /// CAN2 has no filters of its own: those of CAN1 from the bank that CAN2SB names. nullptr: this is CAN1.
+  const BxcanModel* filters_of = nullptr;
+
   // the wire and the other nodes
   std::uint32_t bits_per_second = 250'000;
   bool others_acknowledge = true;

@@ -65,5 +65,34 @@ TEST(PackOf15Cells, SendsTheSixteenthAsNotKnownAndDetectsOvervoltageOfTheLast) {
   EXPECT_EQ(can::Faults::of(frames_of_a_second<15>(3'900'000).at(0x196)).cell_overvoltage_severe, 1U);
 }
 
+/// Only of a cell file that rates pulses. Nothing is closed here, so nothing may flow.
+TEST(PackOfARatedCell, SendsPulseCurrentsAndAnotherOneDoesNot) {
+  files::CellFile rated = table9();
+  rated.pulses.discharge = {.for_10s_a = 18, .for_30s_a = 12};
+  rated.pulses.charge = {.for_10s_a = 9};
+  rated.name = "table9_rated";
+  const auto with = images::firmware_image("stm32f405_forklift", files::parse_cell(files::cell_text(rated), rated.name),
+                                           images::Image::remote);
+  const ImageSize size = expect_within_budgets(with), plain = size_of(image());
+  fmt::print("{} bytes of flash and {} of RAM more\n", size.text + size.data - plain.text - plain.data,
+             size.data + size.bss - plain.data - plain.bss);
+  for (const bool is_rated : {true, false}) {
+    UnicornBoard board{is_rated ? with : image()};
+    board.flash.bytes = started_once();
+    run_until_it_listens(board);
+    for (unsigned k = 0; k < 10; ++k) {
+      for (const can::Frame& f : hal::frames_of(sample_at<16>(k, 3'300'000), 0, static_cast<std::uint16_t>(k)))
+        board.can.others.push_back({wire_frame(f), board.can.now_bit, true});
+      board.run_for_ms(100);
+    }
+    const auto last = last_frames(board);
+    ASSERT_EQ(last.contains(0x18C), is_rated);
+    if (!is_rated) continue;
+    EXPECT_TRUE(can::intact(last.at(0x18C), can::PulseCurrents::data_id));
+    EXPECT_EQ(can::PulseCurrents::of(last.at(0x18C)).discharge_ten_seconds, 0);
+    EXPECT_EQ(can::PulseCurrents::of(last.at(0x18C)).charge_thirty_seconds, 0);
+  }
+}
+
 }  // namespace
 }  // namespace bms::firmware

@@ -103,7 +103,7 @@ void UnicornBoard::start_again(std::uint32_t flags) {
   active_.clear();
   priorities_.fill(0);
   systick_csr_ = systick_rvr_ = 0;
-  enabled_ = 0;
+  enabled_ = {};
   can.write(0, 1U << 15);
   flash.reset();
   timer.reset();
@@ -212,14 +212,16 @@ std::uint32_t UnicornBoard::peripheral_read(std::uint32_t a) {
       return systick_rvr_;
     case scs + 0x018:
       return next_systick_ > ticks_ && !core_stopped()
-                 ? static_cast<std::uint32_t>(static_cast<double>(next_systick_ - ticks_) / ticks_a_cycle())
+                 ? std::min(systick_rvr_,  // it is loaded with the first cycle
+                            static_cast<std::uint32_t>(static_cast<double>(next_systick_ - ticks_) / ticks_a_cycle()))
                  : 0;
     case scs + 0x100:
-    case scs + 0x180:
-      return static_cast<std::uint32_t>(enabled_);
     case scs + 0x104:
+    case scs + 0x108:
+    case scs + 0x180:
     case scs + 0x184:
-      return static_cast<std::uint32_t>(enabled_ >> 32);
+    case scs + 0x188:
+      return enabled_[(a & 0x7F) / 4];
     default:
       return register_value(a);
   }
@@ -283,16 +285,14 @@ bool UnicornBoard::write_core_register(std::uint32_t at, std::uint32_t value, un
       systick_rvr_ = value;
       return true;
     case 0x100:
-      enabled_ |= value;
+    case 0x104:
+    case 0x108:
+      enabled_[(at - 0x100) / 4] |= value;
       return true;
     case 0x180:
-      enabled_ &= ~std::uint64_t{value};
-      return true;
-    case 0x104:
-      enabled_ |= std::uint64_t{value} << 32;
-      return true;
     case 0x184:
-      enabled_ &= ~(std::uint64_t{value} << 32);
+    case 0x188:
+      enabled_[(at - 0x180) / 4] &= ~value;
       return true;
     case 0xD0C:
       if ((value & 4) != 0) ended_ = "the firmware has reset the core";
@@ -347,7 +347,9 @@ std::uint32_t UnicornBoard::pending_exception() const {
   const auto requests = [&](std::uint32_t exception) {
     if (most_urgent == 0 || priority(exception) < priority(most_urgent)) most_urgent = exception;
   };
-  const auto enabled = [&](std::uint32_t exception) { return (enabled_ >> (exception - 16) & 1) != 0; };
+  const auto enabled = [&](std::uint32_t exception) {
+    return (enabled_[(exception - 16) / 32] >> (exception - 16) % 32 & 1) != 0;
+  };
   if (systick_pending_ && (systick_csr_ & 2) != 0) requests(systick_exception);
   if (enabled(pvd) && supply_pending_) requests(pvd);
   if (enabled(can_tx) && can.transmit_interrupt()) requests(can_tx);

@@ -193,7 +193,7 @@ class UnicornBoard {
        supply_low_ = false, supply_pending_ = false;
   std::map<std::uint32_t, std::uint32_t> registers_;
   std::uint32_t systick_csr_ = 0, systick_rvr_ = 0;
-  std::uint64_t enabled_ = 0;                       ///< interrupts 0 to 63
+  std::array<std::uint32_t, 3> enabled_{};          ///< interrupts 0 to 95
   std::array<std::uint8_t, 16 + 96> priorities_{};  ///< by exception number
   std::vector<std::uint32_t> active_;               ///< exceptions that are handled, the most urgent last
   std::uint64_t stopped_ticks_ = 0;

@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 302534dbd9fbbd0451d715c74f9cda17968387bf4027244f0a9390f8f234230c
+// SHA-256 of that file: 5b8fc69584fff181b6a5800a1c4ca282ffbb29b9102243087f9aa2d2c3acbe7b
 #pragma once
 
 #include <array>
@@ -3165,7 +3165,57 @@ struct PackCurrent {
   }
 };
 
+/// Currents that the battery carries for ten and for thirty seconds from now, at most the ratings of the cell file. They go down with the heat of earlier pulses, and are AllowedCurrent while that is derated. Only of packs whose cell file rates pulses.
+struct PulseCurrents {
+  static constexpr const char* name = "PulseCurrents";
+  static constexpr std::uint16_t id = 0x18c;
+  static constexpr std::uint32_t cycle_us = 200000;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 396;
+  static constexpr SignalLayout discharge_ten_seconds_layout = {12, 13, false, 0.25F, 0.0F, 0.0F, 2047.5F, true, 8191};
+  float discharge_ten_seconds = unknown;  ///< [A] Out of the pack, for ten seconds.
+  static constexpr SignalLayout discharge_thirty_seconds_layout = {25, 13, false, 0.25F, 0.0F, 0.0F, 2047.5F, true, 8191};
+  float discharge_thirty_seconds = unknown;  ///< [A] Out of the pack, for thirty seconds.
+  static constexpr SignalLayout charge_ten_seconds_layout = {38, 13, false, 0.25F, 0.0F, 0.0F, 2047.5F, true, 8191};
+  float charge_ten_seconds = unknown;  ///< [A] Into the pack, for ten seconds.
+  static constexpr SignalLayout charge_thirty_seconds_layout = {51, 13, false, 0.25F, 0.0F, 0.0F, 2047.5F, true, 8191};
+  float charge_thirty_seconds = unknown;  ///< [A] Into the pack, for thirty seconds.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<discharge_ten_seconds_layout>(out, discharge_ten_seconds);
+    put<discharge_thirty_seconds_layout>(out, discharge_thirty_seconds);
+    put<charge_ten_seconds_layout>(out, charge_ten_seconds);
+    put<charge_thirty_seconds_layout>(out, charge_thirty_seconds);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr PulseCurrents of(const can::Frame& frame) {
+    PulseCurrents out;
+    out.discharge_ten_seconds = get<discharge_ten_seconds_layout, decltype(out.discharge_ten_seconds)>(frame);
+    out.discharge_thirty_seconds = get<discharge_thirty_seconds_layout, decltype(out.discharge_thirty_seconds)>(frame);
+    out.charge_ten_seconds = get<charge_ten_seconds_layout, decltype(out.charge_ten_seconds)>(frame);
+    out.charge_thirty_seconds = get<charge_thirty_seconds_layout, decltype(out.charge_thirty_seconds)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("DischargeTenSeconds", "A", discharge_ten_seconds, discharge_ten_seconds_layout);
+    see("DischargeThirtySeconds", "A", discharge_thirty_seconds, discharge_thirty_seconds_layout);
+    see("ChargeTenSeconds", "A", charge_ten_seconds, charge_ten_seconds_layout);
+    see("ChargeThirtySeconds", "A", charge_thirty_seconds, charge_thirty_seconds_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    see("DischargeTenSeconds", "Out of the pack, for ten seconds.", std::span<const ValueName>());
+    see("DischargeThirtySeconds", "Out of the pack, for thirty seconds.", std::span<const ValueName>());
+    see("ChargeTenSeconds", "Into the pack, for ten seconds.", std::span<const ValueName>());
+    see("ChargeThirtySeconds", "Into the pack, for thirty seconds.", std::span<const ValueName>());
+  }
+};
+
 /// All messages.
-using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, TruckInputs, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent>;
+using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, TruckInputs, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent, PulseCurrents>;
 
 }  // namespace bms::can

@@ -63,6 +63,48 @@ TEST(Protection, WithoutSamplesOpensFromEveryState) {
               tried.contains(ContactorState::unloading));
 }
 
+/// Of four thermistors at four cells: that of the hot or cold cell is lost, the other cells are at 25 degrees C.
+TEST(Protection, AFaultOfACellThatIsTooHotOrTooColdDoesNotEndWithTheLossOfItsThermistor) {
+  struct Case {
+    Fault fault;
+    int celsius;
+  };
+  constexpr Case cases[] = {{Fault::overtemperature_warning, 56},
+                            {Fault::overtemperature, 63},
+                            {Fault::charge_overtemperature, 47},
+                            {Fault::undertemperature, -23},
+                            {Fault::charge_undertemperature, -3}};
+  for (const std::int16_t lost : {measurement::no_temperature, measurement::shorted_thermistor}) {
+    for (const Case& c : cases) {
+      ProtectionBench b;
+      const auto reads = [&](auto with) { b.change = [&b, with](auto& s) { s.temperature_cdegc[2] = with(b.count); }; };
+      reads([&](auto count) { return static_cast<std::int16_t>(100 * c.celsius + static_cast<int>(count % 3)); });
+      b.run(100);
+      ASSERT_TRUE(has(b.protection.decision().faults, c.fault)) << c.celsius;
+      reads([&](auto) { return lost; });
+      b.run(10 * 600);
+      EXPECT_TRUE(has(b.protection.decision().faults, c.fault)) << c.celsius << " ends while nobody knows";
+      EXPECT_TRUE(has(b.protection.decision().faults, Fault::temperature_lost));
+      reads([](auto count) { return static_cast<std::int16_t>(2'500 + static_cast<int>(count % 3)); });
+      b.run(10 * 130);
+      EXPECT_EQ(b.protection.decision().faults, 0U) << c.celsius << ": it has cooled down, and is known to have";
+    }
+  }
+}
+
+/// The others still raise.
+TEST(Protection, WithALostThermistorAnotherCellThatBecomesTooHotIsAFault) {
+  ProtectionBench b;
+  b.change = [&b](auto& s) {
+    s.temperature_cdegc[2] = measurement::no_temperature;
+    if (b.count > 100) s.temperature_cdegc[0] = static_cast<std::int16_t>(6'300 + b.count % 3);
+  };
+  b.run(100);
+  EXPECT_FALSE(has(b.protection.decision().faults, Fault::overtemperature));
+  b.run(60);
+  EXPECT_TRUE(has(b.protection.decision().faults, Fault::overtemperature));
+}
+
 TEST(Protection, CountsSamplesWithAStoppedOrReversedClockAsMissing) {
   for (const std::int64_t jump : {std::int64_t{0}, std::int64_t{-5'000'000}}) {
     ProtectionBench b;

@@ -126,7 +126,8 @@ class TruckOracle {
     values = quantities_.check(sample, voltage_rejected);
     FaultSet there = 0;
     for (std::size_t k = 0; k < fault_count; ++k) {
-      if (visible_in_samples(k) && rows_[k].check(values[k], step_ms, false)) there |= FaultSet{1} << k;
+      if (visible_in_samples(k) && rows_[k].check(values[k], step_ms, false, *values[23] > 0))
+        there |= FaultSet{1} << k;
     }
     return there;
   }

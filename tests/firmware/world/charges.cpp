@@ -1,107 +1,15 @@
 // Chargers of both protocols on the bus of the truck, around the images with their profiles: from 20 % to full, and
 // with what goes wrong. The chargers are those of tests/firmware/charger_models.hpp; their frames pass the bus, and
 // their current flows in the circuit. The truck's controller repeats that it asks for nothing.
-#include <algorithm>
-#include <cmath>
+#include "tests/firmware/world/charges.hpp"
+
 #include <memory>
 
-#include <fmt/format.h>
-
-#include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
-#include "tests/firmware/charger_models.hpp"
 #include "tests/firmware/world/scenarios.hpp"
 
 namespace bms::world {
 
 namespace {
-
-using plant::Relay;
-
-class Charge {
- public:
-  Charge(const Pack& pack, firmware::Charger& charger, double soc, Outcome& outcome)
-      : charger_(charger), outcome_(outcome), world_(pack.image, setup_of(pack, soc)) {
-    charger_.rated_a = pack.limit_a;
-    world_.set_noise(cell_noise_v, shunt_noise_v);
-    world_.vehicle.on_frame = [this](const can::Frame& frame) { charger_.receive(frame, world_.now_s()); };
-    world_.each_step = [this] { step(); };
-  }
-
-  bool begins() {
-    const double ms = world_.run_until([&] { return gives(); }, 60'000);
-    if (ms < 0) fail("no current");
-    outcome_.values["closed"] = 1e-3 * ms;
-    return ms >= 0;
-  }
-  /// Returns the seconds until the contactors are open, or a negative value.
-  double opens(double within_s) {
-    const double ms = world_.run_until([&] { return !world_.any_main_closed(); }, 1e3 * within_s);
-    if (ms < 0) fail("stays closed");
-    return 1e-3 * ms;
-  }
-  /// Returns the seconds until no current flows: the charger contactor is open.
-  double ends(double within_s) {
-    const double ms = world_.run_until([&] { return std::abs(world_.truck.current_a()) < 0.5; }, 1e3 * within_s);
-    if (ms < 0) fail("goes on");
-    return 1e-3 * ms;
-  }
-  void stays_open(double for_s) {
-    if (world_.run_until([&] { return world_.any_main_closed(); }, 1e3 * for_s) >= 0) fail("closes again");
-  }
-  void run_s(double s) { world_.run_ms(1e3 * s); }
-  bool gives() const { return world_.closed(Relay::charge) && world_.truck.current_a() > 0.8 * charger_.rated_a; }
-  void fail(const std::string& what) { outcome_.fail(fmt::format("{} ({})", what, summary(world_))); }
-  void expect(bool good, const std::string& what) {
-    if (!good) fail(what);
-  }
-  void no_fault() { expect(world_.vehicle.faults_seen() == 0, "a fault"); }
-  void a_fault() { expect(world_.vehicle.faults_seen() != 0, "no fault is named"); }
-  double soc() {
-    double sum = 0;
-    for (std::size_t k = 0; k < world_.truck.cell_count(); ++k) sum += world_.truck.cells().soc(k);
-    return sum / static_cast<double>(world_.truck.cell_count());
-  }
-  void stop() { world_.board.can.others.push_back({firmware::wire_frame(can::Stop{}.frame(1)), 0, true}); }
-  /// Of every case.
-  void end() {
-    outcome_.values["highest"] = highest_v_;
-    outcome_.values["soc"] = soc();
-    outcome_.texts["published"] = fault_names(world_.vehicle.faults_seen());
-    for (const std::string& violation : world_.violations()) outcome_.fail(violation);
-  }
-  double highest_v() const { return highest_v_; }
-
-  bool plugged = true;
-
- private:
-  static constexpr double cell_noise_v = 0.0005, shunt_noise_v = 1e-6;
-
-  static WorldSetup setup_of(const Pack& pack, double soc) {
-    WorldSetup setup = typical_setup(pack);
-    setup.truck.ocv_v = firmware::ocv_beyond_full();
-    for (std::size_t k = 0; k < setup.truck.cells.size(); ++k)
-      setup.truck.cells[k].soc = soc + 0.002 * (static_cast<double>(k % 5) - 2);
-    return setup;
-  }
-  void step() {
-    const double now_s = world_.now_s();
-    world_.plugged = plugged;
-    const double limit_a = plugged ? charger_.limit_a(now_s) : 0, target_v = charger_.target_v(now_s);
-    world_.truck.set_charger({.on = limit_a > 0 && target_v > 0, .voltage_v = target_v, .current_a = limit_a});
-    const bool connected = plugged && world_.closed(Relay::charge);
-    charger_.measured(world_.truck.voltages().charger_v, connected ? std::max(0.0, world_.truck.current_a()) : 0);
-    if (plugged) {
-      for (const can::Frame& frame : charger_.send(now_s))
-        world_.board.can.others.push_back({firmware::wire_frame(frame), 0, true});
-    }
-    highest_v_ = std::max(highest_v_, world_.highest_cell_v());
-  }
-
-  firmware::Charger& charger_;
-  Outcome& outcome_;
-  TruckWorld world_;
-  double highest_v_ = 0;
-};
 
 constexpr double upper_limit_v = 3.65, severe_v = 3.815;
 
@@ -215,13 +123,14 @@ Result run_charges(const Extent& extent) {
       "| charger | current after [s] | open again after [s] | charge at the end | highest cell [V] | published "
       "| |\n|---|---|---|---|---|---|---|\n",
       {}};
-  for (const bool elcon : {true, false}) {
-    const char* profile = elcon ? "elcon" : "cia418";
-    const Pack pack = pack_of(truck_ah, 16, profile);
+  for (unsigned variant = 0; variant < 4; ++variant) {
+    const bool elcon = variant % 2 == 0, own_bus = variant >= 2;
+    const std::string profile = elcon ? "elcon" : "cia418", named = profile + (own_bus ? " on CAN2" : "");
+    const Pack pack = own_bus ? pack_with_charger_bus(profile) : pack_of(truck_ah, 16, profile);
     Cases cases(extent.at_once);
-    extent.set(cases, std::string("charges ") + profile, pack);
+    extent.set(cases, "charges " + named, pack);
     for (const Course& course : courses) {
-      const std::string name = fmt::format("{}: {}", profile, course.name);
+      const std::string name = fmt::format("{}: {}", named, course.name);
       if (!extent.has(name) || (course.of_elcon_only && !elcon)) continue;
       cases.start(name, [&](Outcome& outcome) {
         std::unique_ptr<firmware::Charger> charger;
@@ -229,7 +138,7 @@ Result run_charges(const Extent& extent) {
           charger = std::make_unique<firmware::ElconCharger>();
         else
           charger = std::make_unique<firmware::CanopenCharger>();
-        Charge charge(pack, *charger, course.soc, outcome);
+        Charge charge(pack, *charger, course.soc, outcome, own_bus ? own_charger_bit_rate : 0);
         course.run(charge, *charger, outcome);
         charge.end();
       });

@@ -6,7 +6,9 @@
 #include <fmt/format.h>
 
 #include "files/cell_file.hpp"
+#include "images/chosen_image.hpp"
 #include "images/firmware_image.hpp"
+#include "tests/firmware/world/charges.hpp"
 
 namespace bms::world {
 
@@ -42,6 +44,15 @@ Pack pack_of(double capacity_ah, std::size_t cells, const std::string& vehicle_p
   return {capacity_ah, cell.parameters.limits.discharge_current_max_a, cells,
           images::firmware_image(stacked ? "stm32f405_80v" : "stm32f405_forklift", cell, images::Image::application,
                                  vehicle_profile, cells == (stacked ? 24U : 16U) ? 0 : cells)};
+}
+
+Pack pack_with_charger_bus(const std::string& vehicle_profile) {
+  const files::CellFile cell = scaled(truck_ah);
+  return {truck_ah, cell.parameters.limits.discharge_current_max_a, 16,
+          images::chosen_image("stm32f405_forklift", cell,
+                               {vehicle_profile + "-can2",
+                                {"-DBMS_VEHICLE_PROFILE=" + vehicle_profile, "-DBMS_CHARGER_BUS=can2",
+                                 fmt::format("-DBMS_CHARGER_BIT_RATE={}", own_charger_bit_rate)}})};
 }
 
 WorldSetup random_setup(const Pack& pack, std::uint64_t seed) {

@@ -15,7 +15,7 @@ using plant::Relay;
 namespace {
 
 constexpr unsigned i2c_clock = 6, i2c_data = 7, isolated_clock = 10, isolated_data = 11, can_receive = 8, alert = 5,
-                   plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
+                   charger_receive = 12, plus_auxiliary = 14, minus_auxiliary = 15, port_of_b = 1;
 constexpr std::uint32_t isolated_i2c_base = 0x40005800;  // I2C2
 constexpr unsigned key = 2, charger_plug = 3, coil_supply = 4, interlock_loop = 5, crash_sensor = 13, port_of_c = 2;
 constexpr double longest_sleep_us = 100;  ///< the front end and the converter are asked for interrupts so often
@@ -117,6 +117,11 @@ void TruckWorld::fit_clock() {
   board.rtc = &rtc;
   board.clock_wakes = [this] { exti.line_edge(ExtiModel::clock_line, true); };
   board.bus_falls = [this] { exti.pin_edge(port_of_b, can_receive, false); };
+}
+
+void TruckWorld::fit_charger_bus(std::uint32_t bits_per_second) {
+  charger_bus.emplace(board, bits_per_second);
+  charger_bus->falls = [this] { exti.pin_edge(port_of_b, charger_receive, false); };
 }
 
 // ---- time ----
@@ -399,6 +404,7 @@ std::vector<std::string> TruckWorld::violations() const {
                            &port_b.violations, &port_c.violations, &rtc.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
+  if (charger_bus) all.insert(all.end(), charger_bus->can.violations.begin(), charger_bus->can.violations.end());
   return all;
 }
 

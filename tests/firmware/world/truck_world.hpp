@@ -19,6 +19,7 @@
 #include "plant/circuit/truck.hpp"
 #include "plant/random.hpp"
 #include "tests/firmware/i2c_controller_model.hpp"
+#include "tests/firmware/second_can.hpp"
 #include "tests/firmware/unicorn_board.hpp"
 #include "tests/firmware/world/adc_model.hpp"
 #include "tests/firmware/world/gpio_model.hpp"
@@ -93,6 +94,8 @@ class TruckWorld {
   }
   /// The 32,768 Hz crystal of the real-time clock, which makes stop mode possible. Before the first step.
   void fit_clock();
+  /// The charger has a bus of its own, at CAN2. Before the first step.
+  void fit_charger_bus(std::uint32_t bits_per_second);
   /// No other node is on the bus, so nothing is acknowledged; the truck's controller is off.
   void silence_bus(bool silent) {
     vehicle.talks = !silent;
@@ -136,6 +139,7 @@ class TruckWorld {
   ExtiModel exti;
   AdcModel adc;
   firmware::RtcModel rtc;
+  std::optional<firmware::SecondCan> charger_bus;
   Vehicle vehicle;
   SensorFaults sensors;
   std::function<void()> each_step;
