@@ -20,7 +20,6 @@ LARGE = "1e9"
 GATES = {
     "nothing": "",
     "small next to others": "noticeable=0,noticeable_gain=0",
-    "larger than the error": f"larger_than_error={LARGE}",
     "lasting error grows": f"error_may_grow={LARGE}",
     "contact's wander": "contact_wander=0",
     "end of a discharge": "end_share=0",
@@ -28,7 +27,6 @@ GATES = {
     "own sigmas": "own_sigmas=0",
     "faint": "faint=0",
     "share explained": "explained=0,explained_by_bursts=0",
-    "fast excess": f"fast_excess={LARGE}",
     "far out": f"far_out={LARGE}",
     "one place": f"in_one_place={LARGE}",
     "explains where it acts": "cause_explains=0",
@@ -46,12 +44,12 @@ GATES = {
     "temper and cap": "temper=1,at_most=1",
 }
 GROUPS = {
-    "sizes": ["small next to others", "larger than the error", "lasting error grows"],
+    "sizes": ["small next to others", "lasting error grows"],
     "at one current": ["contact's wander", "end of a discharge"],
     "search": ["resumed", "trades", "one class"],
-    "all of one current and sizes": ["small next to others", "larger than the error", "lasting error grows",
+    "all of one current and sizes": ["small next to others", "lasting error grows",
                                      "contact's wander", "end of a discharge", "implausible shapes"],
-    "adequacy": ["faint", "share explained", "fast excess", "far out", "explains where it acts"],
+    "adequacy": ["faint", "share explained", "far out", "explains where it acts"],
 }
 
 

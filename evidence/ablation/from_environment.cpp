@@ -28,7 +28,7 @@ Number number(std::string_view name, double& value) {
   return {name, [&value](double given) { value = given; }};
 }
 
-std::array<Number, 40> numbers() {
+std::array<Number, 38> numbers() {
   auto& d = thresholds.decision;
   auto& a = thresholds.adequacy;
   auto& p = thresholds.probability;
@@ -46,7 +46,6 @@ std::array<Number, 40> numbers() {
       number("faint", d.faint),
       number("noticeable", d.noticeable),
       number("noticeable_gain", d.noticeable_gain),
-      number("larger_than_error", d.larger_than_error),
       number("contact_wander", d.contact_wander),
       number("end_share", d.end_share),
       number("own_sigmas", d.own_sigmas),
@@ -61,7 +60,6 @@ std::array<Number, 40> numbers() {
       number("explained", a.explained),
       number("explained_by_bursts", a.explained_by_bursts),
       number("unexplained", a.unexplained),
-      number("fast_excess", a.fast_excess),
       number("far_out", a.far_out),
       number("temper", p.temper),
       number("at_most", p.at_most),

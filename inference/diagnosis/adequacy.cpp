@@ -33,7 +33,7 @@ bool is_unknown(const Adequacy& a, const Hypothesis& best) {
   // what is flexible gains on anything: if it is named, its residual must be white
   const double enough =
       best.find(Signature::contact_bursts) != nullptr ? adequacy_limits.explained_by_bursts : adequacy_limits.explained;
-  return !a.found || a.explained < enough || a.residual.fast_excess > adequacy_limits.fast_excess;
+  return !a.found || a.explained < enough;
 }
 
 }  // namespace

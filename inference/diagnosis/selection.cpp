@@ -92,7 +92,7 @@ class Elimination {
           const double gain = found_.gains[m];
           const bool needed =
               gain >= selection_limits.detected && is_credible(found_.best, m) &&
-              (alone || (counts(m, gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without[m], rms_v)));
+              (alone || (is_seen(gain, all_gain, rms_v.at(m)) && !is_within_wander(m, without[m], rms_v)));
           if (needed) return std::nullopt;
           return CertainAndGain(scope_.expected.contains(m), gain);
         });
@@ -158,20 +158,14 @@ class Elimination {
             !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
   }
 
-  /// The cell file may contain what is certain in other tables, and has a small error then.
-  bool is_too_large(std::size_t m, double rms_v) const {
-    return !scope_.expected.contains(m) && rms_v > selection_limits.larger_than_error * error_v_;
-  }
-
-  /// The rounds are limited, and end with mechanisms that may not stay: one that is larger than the error, which
-  /// another one cancels, or one without a strength of its own. Of two that cancel each other one stays, with the other
-  /// as its rival: the recordings know their sum alone. Returns false if all may stay.
+  /// The rounds are limited, and end with mechanisms that may not stay: those without a strength of their own. Of two
+  /// that cancel each other one stays, with the other as its rival: the recordings know their sum alone. Returns false
+  /// if all may stay.
   bool drop_one_not_credible() {
     const std::vector<std::size_t> added = found_.best.hypothesis.added();
     const std::map<std::size_t, double> rms_v = contributions(likelihood_, control_, found_.best).rms_v;
     const std::size_t worst = weakest_removable(added, [&](std::size_t m) -> std::optional<double> {
-      const bool too_large = added.size() > 1 && is_too_large(m, rms_v.at(m));
-      if (!too_large && is_credible(found_.best, m)) return std::nullopt;
+      if (is_credible(found_.best, m)) return std::nullopt;
       return -rms_v.at(m);
     });
     if (worst == no_mechanism) return false;
@@ -193,12 +187,9 @@ class Elimination {
     return true;
   }
 
-  /// One of several mechanisms must be seen, and must not be larger than the error: such ones cancel each other. Of
-  /// these the one goes that is missed less.
-  bool counts(std::size_t m, double gain, double all_gain, double rms_v) const {
-    const bool seen =
-        rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
-    return seen && !is_too_large(m, rms_v);
+  /// One of several mechanisms must be seen.
+  bool is_seen(double gain, double all_gain, double rms_v) const {
+    return rms_v >= selection_limits.noticeable * error_v_ || gain >= selection_limits.noticeable_gain * all_gain;
   }
 
   /// Returns true for a contact, or what is not distinguished from one at one current.

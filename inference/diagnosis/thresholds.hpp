@@ -223,8 +223,6 @@ struct Thresholds {
                                     ///< 144 healthy recordings had such a finding (development split)
     double noticeable = 0.02;       ///< share of the error by which one of several causes moves the voltage, or
     double noticeable_gain = 0.05;  ///< of the gain of all together: the mean square of a short effect is small
-    double larger_than_error = 3;   ///< one of several causes moves the voltage by no more times the error: two
-                                    ///< that cancel each other are larger
     double contact_wander = 0.025;  ///< share of a resistance that a contact wanders in one discharge: the most between
                                     ///< its first and last tenth in 41 discharges of NASA B0005, B0025, B0029, B0038
                                     ///< and B0042 with two voltmeters. A slow cause next to it must explain more
@@ -257,7 +255,6 @@ struct Thresholds {
     double explained = 0.8;             ///< share of the gain that a cause must explain
     double explained_by_bursts = 0.98;  ///< the same for a mechanism that is free to come and go
     double unexplained = 40;            ///< gain of generic columns from which something unknown is there
-    double fast_excess = 0.25;          ///< variance of the whitened residual above 1 that noise does not reach
     double far_out = 0.003;             ///< share of the whitened residual beyond 4 sigma. 0.001 at most in 144
                                         ///< healthy recordings, 0.1 where a converter sticks (development split)
   };
