@@ -96,18 +96,21 @@ class ChargeCount {
   /// Variance of the charge counted since the capacity was last measured.
   constexpr const Variance& variance() const { return health_.reference_variance(); }
 
-  /// Once a minute. off_v: of a voltage from the curve at the SOC; usable: whether it is; reading_v2: its variance
+  /// Once a minute. off_v: of a voltage from the curve at the SOC; usable: whether it is; reading_v2(): its variance
   /// without that of the curve; counted2: by how much that of the counted charge has grown since the last call. Returns
   /// true if the charge is counted with another capacity from now on: then set the time step again.
+  template <class F>
   [[gnu::cold, gnu::noinline]] constexpr bool update(const Soc& soc, const Voltage& off_v, const Curve& curve,
-                                                     bool usable, const Variance& counted2,
-                                                     const Variance& reading_v2) {
+                                                     bool usable, const Variance& counted2, F&& reading_v2) {
     health_.count(Soc(Soc(Soc(soc - checked_soc_) - corrected_) * counted_.template ratio<S>()), counted2);
     begin(soc);
     const Voltage known_v = Voltage(curve.slope * arithmetic::Fraction<S>(CapacityHealth<S>::known_soc));
-    const Variance v2 = Variance(curve.error_v2 + reading_v2);
+    const Variance known_v2 = known_v * known_v;
+    Variance v2(1);
+    if (usable && curve.error_v2 < known_v2 && arithmetic::magnitude(off_v) < known_v)
+      v2 = Variance(curve.error_v2 + reading_v2());
     const bool found =
-        usable && arithmetic::magnitude(off_v) < known_v && v2 < Variance(known_v * known_v)
+        v2 < known_v2
             ? health_.read(Soc(soc + arithmetic::ratio<Soc>(off_v, curve.slope)),
                            arithmetic::ratio<Variance>(arithmetic::ratio<Variance>(v2, curve.slope), curve.slope))
             : health_.leave();

@@ -280,14 +280,16 @@ class SocEstimator {
     const std::uint32_t since_us =
         monitor_.watch(cell, constants_, state_, time_us_, current_a, above_ocv_v, innovation_v, measured);
     const StepInput input{current_a, constants_.duration_s(), temperature_c};
-    const Variance of_resistances_v2 = monitor_.resistance_error_v2(constants_, above_ocv_v, state_);
     std::uint32_t found = 0;
     if (monitor_.needs_check(soc, innovation_v))
-      found = monitor_.judge(cell, input, constants_, soc, innovation_v, of_resistances_v2, interval_, state_);
+      found = monitor_.judge(cell, input, constants_, soc, innovation_v,
+                             monitor_.resistance_error_v2(constants_, above_ocv_v, state_), interval_, state_);
     if (since_us != 0 &&
-        count_.update(soc, Errors::with_error(state_, innovation_v), curve, found == 0,
-                      Errors::counted_variance(state_, cell.noise, count_.variance(), arithmetic::seconds<S>(since_us)),
-                      Variance(cell.noise.voltage_v2 + of_resistances_v2)))
+        count_.update(
+            soc, Errors::with_error(state_, innovation_v), curve, found == 0,
+            Errors::counted_variance(state_, cell.noise, count_.variance(), arithmetic::seconds<S>(since_us)), [&] {
+              return Variance(cell.noise.voltage_v2 + monitor_.resistance_error_v2(constants_, above_ocv_v, state_));
+            }))
       checked_step_us_ = 0;
     if (found != 0 || !monitor_.bank_is_open()) return found;
     std::uint8_t interval = interval_;
