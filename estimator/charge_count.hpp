@@ -23,10 +23,8 @@ class CountedCapacity {
   template <class S>
   constexpr bool follow(const LearnedRatio<S>& found) {
     const std::int32_t ppm = arithmetic::to_micro(found.ratio());
-    const auto away = arithmetic::from_micro<arithmetic::Soc<S>>(ppm - ppm_);
-    const auto differs2 = arithmetic::product<arithmetic::Variance<S>>(
-        found.variance(), arithmetic::Count<S>(differs_sigmas * differs_sigmas));
-    return arithmetic::Variance<S>(away * away) > differs2 && set(ppm);
+    return found.away(ratio<S>(), arithmetic::Variance<S>(0), arithmetic::Count<S>(differs_sigmas * differs_sigmas)) &&
+           set(ppm);
   }
   [[gnu::cold]] constexpr bool set(std::int32_t ppm) {
     if (ppm < least_ppm) ppm = least_ppm;

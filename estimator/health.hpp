@@ -38,14 +38,21 @@ class LearnedRatio {
     ratio_ = arithmetic::from_micro<Ratio>(ratio_ppm);
     variance_ = Variance(sigma * sigma);
   }
-  /// Cold, like all that happens once in minutes: small instead of fast.
-  [[gnu::cold, gnu::noinline]] constexpr void learn(const Ratio& measured, const Variance& measured_variance,
-                                                    const Variance& least) {
+  /// Cold, like all that happens once in minutes: small instead of fast. Arguments by value: gcc would make a copy of
+  /// the function for each source that passes a reference to a number.
+  [[gnu::cold, gnu::noinline]] constexpr void learn(Ratio measured, Variance measured_variance, Variance least) {
     const auto gain = arithmetic::ratio<arithmetic::Fraction<S>>(variance_, Variance(variance_ + measured_variance));
     ratio_ = Ratio(ratio_ + Ratio(measured - ratio_) * gain);
     variance_ = Variance(variance_ - arithmetic::product<Variance>(variance_, gain));
     if (variance_ < least) variance_ = least;
   }
+  /// Returns true if a value is off by more than the root of sigmas2 standard deviations. its_variance: of the value.
+  [[gnu::cold, gnu::noinline]] constexpr bool away(const Ratio& value, const Variance& its_variance,
+                                                   const arithmetic::Count<S>& sigmas2) const {
+    const Ratio by = Ratio(value - ratio_);
+    return Variance(by * by) > arithmetic::product<Variance>(Variance(variance_ + its_variance), sigmas2);
+  }
+  constexpr void double_sigma() { variance_ = arithmetic::product<Variance>(variance_, arithmetic::Count<S>(4)); }
   constexpr const Ratio& ratio() const { return ratio_; }
   constexpr const Variance& variance() const { return variance_; }
   constexpr Health<S> health() const { return {ratio_, arithmetic::root<arithmetic::Soc<S>>(variance_)}; }
@@ -69,6 +76,7 @@ class CapacityHealth {
   static constexpr double most_moved_soc = 4;    ///< no cell has moved so far: the current is wrong
   static constexpr double max_visit_soc = 0.05;  ///< charge moved during one visit
   static constexpr std::uint16_t min_readings = 10;
+  static constexpr int max_sigmas = 3;  ///< a measurement that far away contradicts the estimate
 
   /// counted: change of the SOC by the counted charge since the last call; lost2: its variance.
   constexpr void count(const Soc& counted, const Variance& lost2) {
@@ -124,23 +132,27 @@ class CapacityHealth {
     here_.readings = 0;
     if (visit.readings < min_readings) return false;
     const Soc apart = Soc(visit.voltage_soc - reference_.voltage_soc);
-    if (reference_.readings == 0 || arithmetic::magnitude(visit.moved) < Soc(min_moved_soc) ||
-        arithmetic::magnitude(apart) < Soc(min_moved_soc / 2)) {
-      if (reference_.readings == 0 || visit.variance < reference_.variance) set_reference(visit);
+    const bool begins = reference_.readings == 0;
+    const bool far = !begins && arithmetic::magnitude(visit.moved) >= Soc(min_moved_soc) &&
+                     arithmetic::magnitude(apart) >= Soc(min_moved_soc / 2);
+    if (far)
+      learn(arithmetic::ratio<Soc>(visit.moved, apart), visit, apart);
+    else if (!begins && !(visit.variance < reference_.variance))
       return false;
-    }
-    const auto measured_ratio = arithmetic::ratio<Soc>(visit.moved, apart);
+    reference_ = visit;
+    moved_ = Soc(moved_ - visit.moved);
+    return far;
+  }
+  /// A battery that was replaced has another capacity: measurements that contradict the estimate open the filter. Not
+  /// at once, because a measurement may be wrong by more than is known of it.
+  constexpr void learn(const Soc& measured_ratio, const Visit& visit, const Soc& apart) {
     const Variance apart2 = apart * apart, moved2 = visit.moved * visit.moved;
     // (moved / apart)^2 times the relative variance of apart
     const Variance measured_variance = arithmetic::ratio<Variance>(
         arithmetic::ratio<Variance>(Variance(Variance(visit.variance + reference_.variance) * moved2), apart2), apart2);
+    if (learned_.away(measured_ratio, measured_variance, arithmetic::Count<S>(max_sigmas * max_sigmas)))
+      learned_.double_sigma();
     learned_.learn(measured_ratio, measured_variance, Variance(min_sigma * min_sigma));
-    set_reference(visit);
-    return true;
-  }
-  constexpr void set_reference(const Visit& visit) {
-    reference_ = visit;
-    moved_ = Soc(moved_ - visit.moved);
   }
 
   Visit here_, reference_;
