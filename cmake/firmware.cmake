@@ -127,6 +127,7 @@ if(BMS_CHARGER_BUS STREQUAL "can2")
       "no other profile has a charger that asks for a charge")
   endif()
   set(charger_bus true)
+  set(truck_side true)  # its state is in TruckInputs
 elseif(BMS_CHARGER_BUS AND NOT BMS_CHARGER_BUS STREQUAL "can1")
   message(FATAL_ERROR "BMS_CHARGER_BUS is ${BMS_CHARGER_BUS}, expected can1 or can2")
 endif()
@@ -297,7 +298,7 @@ set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/
 # More than 16 cells have two chips, each on a bus of its own.
 set(isolated_bus "")
 if(BMS_SAMPLES STREQUAL "bq76952" AND BMS_CELLS GREATER 16)
-  list(APPEND samples_bq76952 ${hal}/bq76952/stack.cpp ${root}/firmware/front_end/upper_settings.cpp)
+  list(APPEND samples_bq76952 ${hal}/bq76952/stack.cpp)
   set(isolated_bus hal_isolated_bus)
   bms_shared_objects(hal_isolated_bus -Os ${chip}/i2c.cpp)
   if(NOT BMS_SHARED_OBJECTS)

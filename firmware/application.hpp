@@ -1,6 +1,5 @@
-// The application: for each sample it updates the estimator, evaluates the protections, drives the contactors,
-// publishes CAN messages, handles commands and stores its state. It feeds the watchdog only if all of that has made
-// progress (firmware/progress.hpp).
+// The application: for each sample it updates the estimator, evaluates the protections, drives the contactors, sends
+// messages, handles commands and stores its state. It feeds the watchdog only after progress in all (progress.hpp).
 //
 //   Board   number of cells, and the functions that depend on the cell file: estimator step, time of the last step,
 //           condition, differences between the cells, plausible range of a reading, protection plan
@@ -140,7 +139,8 @@ class Application {
   using StateToStore = StateToStoreOf<typename Estimator::Scalar, cells>;
   static constexpr int max_requests = 4;  // per sample: bounds its processing time
 
-  void publish(const measurement::PackSample<cells>& pack, const measurement::Sample& mean, const Result& estimate) {
+  [[gnu::noinline]] void publish(const measurement::PackSample<cells>& pack, const measurement::Sample& mean,
+                                 const Result& estimate) {  // else what follows in a sample has its frame, too
     const Snapshot<Estimator, cells> now{.pack = pack,
                                          .mean = mean,
                                          .estimate = estimate,
@@ -284,8 +284,8 @@ class Application {
                         hal::calendar_s());
   }
 
-  /// Returns false if the frame is not a command.
-  bool handle_command(const can::Frame& frame, std::uint64_t now_us) {
+  /// Returns false if the frame is not a command. Inlined, because its callees have the deepest stack of all.
+  [[gnu::always_inline]] bool handle_command(const can::Frame& frame, std::uint64_t now_us) {
     bool serviced = false;
     const auto may = [&](Privilege privilege) {
       if (privilege == Privilege::drive) return !access_.drive.needed();

@@ -20,6 +20,7 @@
 
 #include "firmware/cycle.hpp"
 #include "hal/bytes.hpp"
+#include "hal/can.hpp"
 #include "hal/charger_bus.hpp"
 
 namespace bms::firmware::canopen {
@@ -47,11 +48,14 @@ struct Entry {
   std::string_view text{};  ///< if not empty, instead of value; of static storage
 };
 
+/// Of a node; the same bus if the charger has none of its own.
+enum class Bus : std::uint8_t { of_charger, of_truck };
+
 class Node {
  public:
   static constexpr std::uint32_t heartbeat_us = 500'000;
 
-  constexpr explicit Node(std::uint8_t id) : id_(id) {}
+  constexpr explicit Node(std::uint8_t id, Bus bus = Bus::of_charger) : id_(id), bus_(bus) {}
 
   constexpr NodeState state() const { return state_; }
 
@@ -91,9 +95,14 @@ class Node {
     if (command == reset_node || command == reset_communication) state_ = NodeState::boot_up;
   }
 
-  void send_heartbeat(NodeState state) const {
-    hal::send_to_charger({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}});
+  void send(const can::Frame& frame) const {
+    if constexpr (hal::has_charger_bus) {
+      if (bus_ == Bus::of_truck) return static_cast<void>(hal::can_send(frame));
+    }
+    hal::send_to_charger(frame);
   }
+
+  void send_heartbeat(NodeState state) const { send({heartbeat_id + id_, 1, {static_cast<std::uint8_t>(state)}}); }
 
   template <class Objects>
   void serve_sdo(const can::Frame& request, Objects& objects) {
@@ -118,7 +127,7 @@ class Node {
       answer.data[0] = 0x60;
     }
     if (abort_code != AbortCode::none) make_abort(answer, abort_code);
-    hal::send_to_charger(answer);
+    send(answer);
   }
 
   static void make_abort(can::Frame& answer, AbortCode code) {
@@ -140,12 +149,13 @@ class Node {
       rest_.remove_prefix(sent);
       toggle_ ^= 0x10;
     }
-    hal::send_to_charger(answer);
+    send(answer);
   }
 
   Cycle heartbeat_;
   std::uint8_t id_;
   NodeState state_ = NodeState::boot_up;
+  Bus bus_;
   std::string_view rest_{};               ///< of a text that is read
   std::array<std::uint8_t, 3> object_{};  ///< index and subindex of the last transfer
   std::uint8_t toggle_ = 0;

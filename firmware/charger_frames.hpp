@@ -1,5 +1,5 @@
 // Which frames the profile of a charger receives: those of its own bus, or of the truck's bus if it has none. What a
-// node of the truck sends is then nothing for the profile, and what a charger sends is nothing for the application.
+// node of the truck sends is then nothing for the charge, and what a charger sends is nothing for the application.
 #pragma once
 
 #include <cstdint>
@@ -13,7 +13,10 @@ namespace bms::firmware {
 template <class Profile>
 [[gnu::always_inline]] inline void receive_from_truck_bus(Profile& profile, const can::Frame& frame,
                                                           std::uint64_t now_us) {
-  if constexpr (!hal::has_charger_bus) profile.receive(frame, now_us);
+  if constexpr (!hal::has_charger_bus)
+    profile.receive(frame, now_us);
+  else if constexpr (requires { profile.receive_from_truck(frame); })
+    profile.receive_from_truck(frame);
 }
 
 /// Frames of other protocols, of each bus at most so many in a sample. frame: where they are stored.

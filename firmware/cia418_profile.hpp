@@ -23,6 +23,9 @@
 // firmware/can/messages.md names the sources, and the points that no text confirms. CANopen has no end-to-end
 // protection: use the battery's own messages for everything that opens contactors. Cost: 0.7 % of a bus of 250 kbit/s.
 // An SDO request is answered with the next sample.
+//
+// If the charger has a bus of its own (BMS_CHARGER_BUS), the battery is a node of the truck's bus, too: with the same
+// number and objects and a state of its own, but without PDOs and without a charger.
 #pragma once
 
 #include <algorithm>
@@ -30,6 +33,7 @@
 #include <cstdint>
 #include <string_view>
 #include <tuple>
+#include <type_traits>
 
 #include "firmware/canopen.hpp"
 #include "firmware/charge_control.hpp"
@@ -59,8 +63,9 @@ class Cia418Profile {
   void publish(const Snapshot<Estimator, Cells>& now) {
     control_.update(now, {.present = charger_.present(now.pack.time_us)});
     update_objects(now);
-    if (!hal::charger_listening()) return;
     const auto now_us = static_cast<std::uint32_t>(now.pack.time_us);
+    if (hal::has_charger_bus && hal::can_listening()) truck_node_.update_heartbeat(now_us);
+    if (!hal::charger_listening()) return;
     node_.update_heartbeat(now_us);
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
@@ -69,6 +74,8 @@ class Cia418Profile {
     charger_.receive(frame, now_us);
     node_.receive(frame, *this);
   }
+  /// A frame of the truck's bus, which is not that of the charger.
+  void receive_from_truck(const can::Frame& frame) { truck_node_.receive(frame, *this); }
 
   /// An operational charger asks for a charge until its heartbeat ends or has another state, or the battery is full.
   constexpr ChargerState charger(std::uint64_t now_us) const {
@@ -171,7 +178,16 @@ class Cia418Profile {
     for (const can::Frame& pdo : {status, voltage, request}) hal::send_to_charger(pdo);
   }
 
+  struct NoNode {
+    constexpr void update_heartbeat(std::uint32_t) {}
+    constexpr void receive(const can::Frame&, Cia418Profile&) {}
+  };
+  struct TruckNode : canopen::Node {
+    TruckNode() : Node(static_cast<std::uint8_t>(hal::canopen_node), canopen::Bus::of_truck) {}
+  };
+
   canopen::Node node_{static_cast<std::uint8_t>(hal::canopen_node)};
+  [[no_unique_address]] std::conditional_t<hal::has_charger_bus, TruckNode, NoNode> truck_node_;
   canopen::Peer charger_{static_cast<std::uint8_t>(hal::canopen_charger)};
   ChargeControl control_;
   Cycle cycle_;

@@ -21,6 +21,7 @@
 #include "firmware/stored_state.hpp"
 #include "firmware/truck_message.hpp"
 #include "hal/can.hpp"
+#include "hal/charger_bus.hpp"
 #include "hal/power.hpp"
 #include "protection/protection.hpp"
 
@@ -154,13 +155,16 @@ class Telemetry {
   void publish_truck(const BoardStatus& board) {
     if constexpr (!hal::may_have_truck) return;
     // Without inputs the message begins with the first wrong sensor, and then says when none is wrong any more.
-    if (board.truck.fitted == 0 && !board.insulation.fitted && published_inputs_ == 0 &&
+    if (!hal::has_charger_bus && board.truck.fitted == 0 && !board.insulation.fitted && published_inputs_ == 0 &&
         board.wrong_current_sensor == can::TruckInputs::wrong_current_sensor_none)
       return;
     const std::uint32_t inputs =
         1U << 31 | board.wrong_current_sensor << 28 | board.truck.fitted << 16 | board.truck.on;
     send_if_due_or_changed<can::TruckInputs>(inputs != published_inputs_, [&] {
-      return messages::truck_inputs(board.truck, board.insulation, board.truck_outputs, board.wrong_current_sensor);
+      const auto m =
+          messages::truck_inputs(board.truck, board.insulation, board.truck_outputs, board.wrong_current_sensor);
+      if constexpr (hal::has_charger_bus) return messages::with_charger_bus(m, hal::charger_can_health());
+      return m;
     });
     published_inputs_ = inputs;
   }

@@ -1,7 +1,8 @@
-// The message TruckInputs: inputs and outputs of the truck, and its insulation.
+// The message TruckInputs: inputs and outputs of the truck, its insulation, and the state of the charger's own bus.
 #pragma once
 
 #include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
+#include "hal/can.hpp"
 #include "hal/insulation.hpp"
 #include "hal/truck_inputs.hpp"
 
@@ -28,6 +29,14 @@ constexpr can::TruckInputs truck_inputs(const hal::TruckInputs& truck, const hal
   m.interlock = state(Input::interlock);
   m.crash_sensor = state(Input::crash);
   if (insulation.ohm != measurement::no_reading) m.insulation = 0.1F * static_cast<float>(insulation.ohm / 100);
+  return m;
+}
+
+/// health: of the charger's own bus.
+constexpr can::TruckInputs with_charger_bus(can::TruckInputs m, const hal::CanHealth& health) {
+  static_assert(static_cast<std::uint32_t>(hal::CanState::bus_off) == can::TruckInputs::charger_bus_bus_off);
+  m.charger_bus = static_cast<std::uint32_t>(health.state);
+  m.charger_bus_offs = health.bus_offs & 0xFF;
   return m;
 }
 

@@ -17,8 +17,8 @@ inline constexpr std::uint16_t stop_frame_id = 0x0A0, command_frame_id = 0x1A0, 
                                command_authority_frame_id = 0x1B1, drive_request_frame_id = 0x1B2;
 inline constexpr std::uint32_t request_code = 4;  ///< of a Command: a request for power
 
-/// Of a CANopen charger (firmware/cia418_profile.hpp): network management, requests to the battery's SDO server and the
-/// charger's heartbeat.
+/// Of a CANopen charger (firmware/cia418_profile.hpp): network management, requests to the battery's SDO server and,
+/// the last one, the charger's heartbeat.
 inline constexpr auto charger_ids = [] {
   if constexpr (vehicle_profile == VehicleProfile::cia418)
     return std::array<std::uint16_t, 3>{0x000, 0x600 + canopen_node, 0x700 + canopen_charger};
@@ -26,13 +26,15 @@ inline constexpr auto charger_ids = [] {
     return std::array<std::uint16_t, 0>{};
 }();
 
-/// Stops, commands, the frames of service sessions, requests; a charger's frames if it is on this bus.
+/// Stops, commands, the frames of service sessions, requests; a charger's frames if it is on this bus, and otherwise
+/// those that every node of a CANopen bus receives.
 inline constexpr auto request_ids = [] {
   constexpr std::array<std::uint16_t, 5> own{stop_frame_id, command_frame_id, service_request_frame_id,
                                              command_authority_frame_id, drive_request_frame_id};
-  std::array<std::uint16_t, own.size() + (has_charger_bus ? 0 : charger_ids.size())> ids{};
+  constexpr std::size_t others = has_charger_bus && !charger_ids.empty() ? charger_ids.size() - 1 : charger_ids.size();
+  std::array<std::uint16_t, own.size() + others> ids{};
   std::ranges::copy(own, ids.begin());
-  if constexpr (!has_charger_bus) std::ranges::copy(charger_ids, ids.begin() + own.size());
+  std::copy_n(charger_ids.begin(), others, ids.begin() + own.size());
   return ids;
 }();
 

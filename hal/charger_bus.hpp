@@ -17,6 +17,7 @@ namespace bms::hal {
 /// No identifier of the battery's own messages is there, so none is moved.
 inline constexpr CanSettings charger_bus_settings{charger_bit_rate, Identifiers::dbc_base, Identifiers::dbc_stop};
 
+/// settings: the bit rate is that of the build.
 void charger_can_start(const CanSettings& settings = charger_bus_settings);
 bool charger_can_listening();
 bool charger_can_send(const can::Frame& frame);

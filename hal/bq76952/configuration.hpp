@@ -236,8 +236,7 @@ constexpr Configuration configuration(const Board& b, std::span<const Setting> s
 
 /// Of this image: firmware/front_end/settings.cpp.
 extern const Configuration board_configuration;
-/// Of the upper chip of a pack of more than 16 cells: firmware/front_end/upper_settings.cpp. board_configuration is
-/// then that of the lower one.
+/// Of the upper chip of a pack of more than 16 cells. board_configuration is then that of the lower one.
 extern const Configuration upper_configuration;
 
 }  // namespace bms::hal::bq76952

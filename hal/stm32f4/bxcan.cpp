@@ -25,7 +25,6 @@
 #include <span>
 #include <utility>
 
-#include "hal/bxcan/bit_timing.hpp"
 #include "hal/bxcan/transmit_queue.hpp"
 #include "hal/can.hpp"
 #include "hal/can_suspend.hpp"
@@ -39,20 +38,9 @@ namespace {
 
 using namespace stm32f4;
 
-struct Rate {
-  std::uint32_t bit_rate, btr, phase_timeout_us;
-};
-/// At 500 and 1,000 kbit/s the sample point is 85.7 %, the nearest one to 87.5 % that the clock allows.
-consteval Rate rate(std::uint32_t bit_rate) {
-  const std::uint32_t recovery_us = bxcan::longest_recovery_us(bit_rate), margin_us = recovery_us / 5;
-  return {bit_rate, bxcan::bit_timing(crystal_apb1_hz, bit_rate, bxcan::cia301_allows).btr(),
-          std::max<std::uint32_t>(100'000, recovery_us + margin_us)};
-}
-/// That of the build first: it is used if the settings have another one that is not here.
-constexpr std::array rates{rate(settings_of_bus.bit_rate), rate(125'000), rate(250'000), rate(500'000),
-                           rate(1'000'000)};
-const Rate* timing = &rates[0];
-Identifiers identifiers{settings_of_bus};
+const Rate* chosen_rate = &rates[0];
+const Rate& timing() { return rates.size() == 1 ? rates[0] : *chosen_rate; }
+IdentifiersOfBus identifiers{settings_of_bus};
 
 constexpr std::uint64_t no_progress_us = 100'000, pause_us = 1'000'000;
 constexpr std::uint32_t first_rest_us = 100'000, longest_rest_us = 1'600'000;
@@ -204,7 +192,7 @@ void set_filters() {
 
 void configure() {
   can_mcr() = mcr_inrq | mcr_rflm;  // a full FIFO discards new frames instead of old ones
-  can_btr() = timing->btr;
+  can_btr() = timing().btr;
   set_filters();
   can_ier() = ier_tme | ier_fmp0 | ier_fov0;
 }
@@ -258,7 +246,7 @@ void service() {
       return ask_for_initialisation();
     case Phase::entering:
       if (!initialising) {
-        if (elapsed >= timing->phase_timeout_us) abandon_phase();
+        if (elapsed >= timing().phase_timeout_us) abandon_phase();
         return;
       }
       configure();
@@ -270,7 +258,7 @@ void service() {
         paused_since_us = progress_us = now_us();
         return enter(Phase::on);
       }
-      if (elapsed >= timing->phase_timeout_us) abandon_phase();
+      if (elapsed >= timing().phase_timeout_us) abandon_phase();
       return;
     case Phase::on:
       if (!bus_off) return watch_transmission();
@@ -289,9 +277,9 @@ bool on_the_bus() { return phase == Phase::on && (can_esr() & esr_bus_off) == 0;
 }  // namespace
 
 void BMS_OF_BUS(can_start)(const CanSettings& settings) {
-  identifiers = Identifiers(settings);
+  identifiers = IdentifiersOfBus(settings);
   for (const Rate& r : rates) {
-    if (r.bit_rate == settings.bit_rate) timing = &r;
+    if (r.bit_rate == settings.bit_rate) chosen_rate = &r;
   }
   if (clocks().core_hz != crystal_core_hz) return;
   rcc_ahb1enr() = rcc_ahb1enr() | 1U << 1;

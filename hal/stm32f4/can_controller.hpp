@@ -4,21 +4,26 @@
 // receives.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
 #include <span>
 
 #include "hal/accepted_frames.hpp"
+#include "hal/bxcan/bit_timing.hpp"
 #include "hal/bxcan/filter_banks.hpp"
 #include "hal/can.hpp"
 #include "hal/charger_bus.hpp"
+#include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
 #include "hal/update_frames.hpp"
 
 namespace bms::hal::stm32f4 {
 
+// A namespace for each: the linker keeps one of two inline definitions with the same name.
 #ifdef BMS_CHARGER_BUS
+inline namespace charger_bus {
 #define BMS_OF_BUS(function) charger_##function
 #define BMS_INTERRUPT_OF_BUS(interrupt) can2_##interrupt
 inline constexpr std::uint32_t can_controller = 0x40006800, can_clocks = 3U << 25, first_bank = 14;
@@ -28,7 +33,15 @@ inline constexpr std::size_t queue_frames = 8, ring_frames = 16;  // a profile s
 inline constexpr CanSettings settings_of_bus = charger_bus_settings;
 inline constexpr auto long_ids_of_bus = charger_bus_long_ids;
 inline std::span<const std::uint16_t> ids_of_bus() { return charger_bus_ids; }
+/// No identifier is moved: none is one of the battery's own messages.
+struct IdentifiersOfBus {
+  constexpr explicit IdentifiersOfBus(const CanSettings&) {}
+  static constexpr std::uint16_t on_the_bus(std::uint16_t id) { return id; }
+  static constexpr const can::Frame& on_the_bus(const can::Frame& frame) { return frame; }
+  static constexpr bool from_the_bus(const can::Frame&) { return true; }
+};
 #else
+inline namespace truck_bus {
 #define BMS_OF_BUS(function) function
 #define BMS_INTERRUPT_OF_BUS(interrupt) can1_##interrupt
 inline constexpr std::uint32_t can_controller = 0x40006400, can_clocks = 1U << 25, first_bank = 0;
@@ -38,6 +51,7 @@ inline constexpr std::size_t queue_frames = 32, ring_frames = 64;
 inline constexpr CanSettings settings_of_bus = can_settings_of_build;
 inline constexpr auto long_ids_of_bus = long_ids;
 inline std::span<const std::uint16_t> ids_of_bus() { return accepted_ids(); }
+using IdentifiersOfBus = Identifiers;
 #endif
 inline constexpr std::uint32_t two_pins = 2 * first_pin, four_bits = 4 * (first_pin % 8);  // places in MODER and AFRH
 inline constexpr std::uint32_t banks_of_bus = 0x3FFFU << first_bank;
@@ -46,6 +60,24 @@ static_assert(bxcan::fits(with_updates(request_ids), long_ids.size()) &&
                   bxcan::fits(with_updates(request_and_sample_ids), long_ids.size()),
               "too many identifiers for the acceptance filters of CAN1");
 static_assert(bxcan::bank_count(charger_bus_ids) + charger_bus_long_ids.size() <= bxcan::max_banks);
+
+struct Rate {
+  std::uint32_t bit_rate, btr, phase_timeout_us;
+};
+/// At 500 and 1,000 kbit/s the sample point is 85.7 %, the nearest one to 87.5 % that the clock allows.
+consteval Rate rate(std::uint32_t bit_rate) {
+  const std::uint32_t recovery_us = bxcan::longest_recovery_us(bit_rate), margin_us = recovery_us / 5;
+  return {bit_rate, bxcan::bit_timing(crystal_apb1_hz, bit_rate, bxcan::cia301_allows).btr(),
+          std::max<std::uint32_t>(100'000, recovery_us + margin_us)};
+}
+/// That of the build first: it is used if the settings have another one that is not here. No parameter sets the bit
+/// rate of the charger's own bus.
+#ifdef BMS_CHARGER_BUS
+inline constexpr std::array rates{rate(settings_of_bus.bit_rate)};
+#else
+inline constexpr std::array rates{rate(settings_of_bus.bit_rate), rate(125'000), rate(250'000), rate(500'000),
+                                  rate(1'000'000)};
+#endif
 
 inline Register& can_mcr() { return at<can_controller>(); }
 inline Register& can_msr() { return at<can_controller + 0x04>(); }
@@ -108,4 +140,5 @@ inline void enable_interrupts() {
   }
 }
 
+}  // namespace charger_bus or truck_bus
 }  // namespace bms::hal::stm32f4

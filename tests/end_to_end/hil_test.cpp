@@ -70,6 +70,40 @@ TEST_F(Hil, APackOfEightCellsDrivesWithoutFaults) {
   EXPECT_THAT(refused.err, HasSubstr("7 cells, expected 8 to 16"));
 }
 
+/// The board of 80 V, 24 cells at two chips: 1 to 12 and 13 to 24.
+class HilOf80Volts : public Hil {
+ protected:
+  ToolRun drive(const std::string& arguments) const {
+    return run_tool("hil --board stm32f405_80v --json - --initial-soc 0.6 --announced-soc 0.6 --profile " +
+                    short_drive(folder_.path()) + " " + arguments);
+  }
+};
+TEST_F(HilOf80Volts, ADriveWithoutFaultsRaisesNoFaultAndPublishesTheTrueSoc) {
+  const auto r = drive("");
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  EXPECT_EQ(j["cells"], 24);
+  EXPECT_TRUE(j["faults"].empty()) << j["faults"].dump();
+  EXPECT_EQ(j["unanswered"], 0);
+  EXPECT_EQ(j["lost"], 0);
+  EXPECT_LT(j["driving_after_s"], 10);
+  EXPECT_LT(j["soc"]["rmse"], 0.01);
+  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+}
+TEST_P(HilOf80Volts, AnInjectedFaultOfEitherHalfIsReportedInTime) {
+  const auto r = drive(std::string("--fault ") + GetParam());
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  ASSERT_EQ(j["reactions"].size(), 1U);
+  EXPECT_TRUE(j["reactions"][0]["in_time"]) << j["reactions"].dump() << j["faults"].dump();
+  EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
+  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+}
+INSTANTIATE_TEST_SUITE_P(Faults, HilOf80Volts,
+                         ::testing::Values("cell_high=1@60", "cell_open=24@60", "sense_wire=12@60"), [](const auto& i) {
+                           return std::string(i.param).substr(0, std::string(i.param).find_first_of("=@"));
+                         });
+
 TEST_F(Hil, IsReproducible) {
   const auto run = [&] {
     Json j = of(loop("--fault drop=0.01@0 --seed 5 --candump " + (folder_.path() / "dump").string()));

@@ -110,6 +110,19 @@ TEST(ForkliftBudgets, HoldForACellFileThatRatesPulses) {
   EXPECT_LE(worst, budget.stack);
 }
 
+/// With cia418 it is above the budget; boards/stm32f405_80v/README.md states by how much.
+TEST(BudgetsOf80Volts, HoldForAChargerBusOfItsOwnWithElcon) {
+  const BoardBudget budget = budget_of("stm32f405_80v");
+  const auto two = images::chosen_image("stm32f405_80v", files::read_cell("table9"),
+                                        {"elcon-can2", {"-DBMS_VEHICLE_PROFILE=elcon", "-DBMS_CHARGER_BUS=can2"}});
+  const ImageSize size = size_of(two);
+  std::printf("elcon on CAN2: %zu bytes of flash, %zu of RAM\n", static_cast<std::size_t>(size.text + size.data),
+              static_cast<std::size_t>(size.data + size.bss));
+  EXPECT_LE(size.text + size.data, budget.flash);
+  EXPECT_LE(size.data + size.bss, budget.ram);
+  EXPECT_LE(stack_depth(two).worst(), budget.stack);
+}
+
 // instructions as objdump prints them
 const std::string main_calls_two = R"(
 08000000 <main>:

@@ -43,7 +43,7 @@ struct RatedCell : Table9Board<cells> {
   static void update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                const measurement::Sample& sample, const estimator::Estimate<float>& e,
                                bool limits_wanted) {
-    condition.update(tables(), sample, e, estimator.state(), limits_wanted);
+    condition.update(tables(), sample, e, estimator, limits_wanted);
   }
   static const protection::ProtectionPlan& plan() {
     static const auto plan = [] {

@@ -170,6 +170,18 @@ TEST(TruckInputs, ThatAreNotFittedDoNothingAndAreNotKnown) {
   EXPECT_EQ(last<Inputs>()->coil_supply, Inputs::coil_supply_on);
 }
 
+TEST(TruckInputs, SayTheStateOfTheChargersOwnBus) {
+  const Inputs none = messages::truck_inputs({}, {}, 0, Inputs::wrong_current_sensor_none);
+  EXPECT_EQ(none.charger_bus, Inputs::charger_bus_none);
+  const Inputs off = messages::with_charger_bus(none, {.state = hal::CanState::bus_off, .bus_offs = 0x102});
+  EXPECT_EQ(off.charger_bus, Inputs::charger_bus_bus_off);
+  EXPECT_EQ(off.charger_bus_offs, 2U);
+  const Inputs received = Inputs::of(off.frame(3));
+  EXPECT_EQ(received.charger_bus, off.charger_bus);
+  EXPECT_EQ(received.charger_bus_offs, off.charger_bus_offs);
+  EXPECT_EQ(received.crash_sensor, Inputs::crash_sensor_not_known);
+}
+
 TEST(Insulation, BelowAHundredOhmPerVoltForbidsChargingAndAMissingMonitorWarns) {
   TruckDay t(true, std::nullopt, all_inputs);
   host_hal::insulation = {true, 7'000};  // 16 cells of 3.65 V: 5,840 ohm

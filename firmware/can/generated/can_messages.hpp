@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 5b8fc69584fff181b6a5800a1c4ca282ffbb29b9102243087f9aa2d2c3acbe7b
+// SHA-256 of that file: 00ed14f29fcdb4c4c68831edd26ba49bb96151c39aa34281633611da684b7ea3
 #pragma once
 
 #include <array>
@@ -2180,7 +2180,7 @@ struct Board {
   }
 };
 
-/// Inputs and outputs of the truck, of a board that has an input (BMS_INPUTS) or an insulation monitor. Also sent at once when an input changes.
+/// Inputs and outputs of the truck, of a board that has an input (BMS_INPUTS), an insulation monitor or a bus of its own for the charger. Also sent at once when an input changes.
 struct TruckInputs {
   static constexpr const char* name = "TruckInputs";
   static constexpr std::uint16_t id = 0x1ba;
@@ -2223,8 +2223,18 @@ struct TruckInputs {
   static constexpr std::uint32_t crash_sensor_off = 0;
   static constexpr std::uint32_t crash_sensor_on = 1;
   static constexpr std::uint32_t crash_sensor_not_known = 3;
+  static constexpr SignalLayout charger_bus_layout = {28, 3, false, 1.0F, 0.0F, 0.0F, 5.0F, false, 0};
+  std::uint32_t charger_bus = 0;  ///< Controller of the charger's own bus (BMS_CHARGER_BUS), by its error counters. Passive is usual while no charger is plugged in, because nobody acknowledges.
+  static constexpr std::uint32_t charger_bus_none = 0;
+  static constexpr std::uint32_t charger_bus_starting = 1;
+  static constexpr std::uint32_t charger_bus_active = 2;
+  static constexpr std::uint32_t charger_bus_warning = 3;
+  static constexpr std::uint32_t charger_bus_passive = 4;
+  static constexpr std::uint32_t charger_bus_bus_off = 5;
   static constexpr SignalLayout insulation_layout = {32, 16, false, 0.1F, 0.0F, 0.0F, 6553.4F, true, 65535};
   float insulation = unknown;  ///< [kohm] Between battery and frame, as the insulation monitor has measured.
+  static constexpr SignalLayout charger_bus_offs_layout = {48, 8, false, 1.0F, 0.0F, 0.0F, 255.0F, false, 0};
+  std::uint32_t charger_bus_offs = 0;  ///< Times that the charger's own bus was off since the start; it wraps.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
@@ -2237,7 +2247,9 @@ struct TruckInputs {
     put<coil_supply_layout>(out, coil_supply);
     put<interlock_layout>(out, interlock);
     put<crash_sensor_layout>(out, crash_sensor);
+    put<charger_bus_layout>(out, charger_bus);
     put<insulation_layout>(out, insulation);
+    put<charger_bus_offs_layout>(out, charger_bus_offs);
     protect(out, data_id, counter);
     return out;
   }
@@ -2252,7 +2264,9 @@ struct TruckInputs {
     out.coil_supply = get<coil_supply_layout, decltype(out.coil_supply)>(frame);
     out.interlock = get<interlock_layout, decltype(out.interlock)>(frame);
     out.crash_sensor = get<crash_sensor_layout, decltype(out.crash_sensor)>(frame);
+    out.charger_bus = get<charger_bus_layout, decltype(out.charger_bus)>(frame);
     out.insulation = get<insulation_layout, decltype(out.insulation)>(frame);
+    out.charger_bus_offs = get<charger_bus_offs_layout, decltype(out.charger_bus_offs)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -2267,7 +2281,9 @@ struct TruckInputs {
     see("CoilSupply", "", coil_supply, coil_supply_layout);
     see("Interlock", "", interlock, interlock_layout);
     see("CrashSensor", "", crash_sensor, crash_sensor_layout);
+    see("ChargerBus", "", charger_bus, charger_bus_layout);
     see("Insulation", "kohm", insulation, insulation_layout);
+    see("ChargerBusOffs", "", charger_bus_offs, charger_bus_offs_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
@@ -2281,7 +2297,9 @@ struct TruckInputs {
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("CoilSupply", "Off, as by an emergency stop: nothing closes. This is a state, not a fault; the next new request closes again.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("Interlock", "Off: the loop through the power connectors is open.", std::span<const ValueName>(names)); }
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "off"}, ValueName{1, "on"}, ValueName{3, "not known"}}}; see("CrashSensor", "Off: crash, tilt, or a broken wire of the sensor.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 6> names{{ValueName{0, "none"}, ValueName{1, "starting"}, ValueName{2, "active"}, ValueName{3, "warning"}, ValueName{4, "passive"}, ValueName{5, "bus-off"}}}; see("ChargerBus", "Controller of the charger's own bus (BMS_CHARGER_BUS), by its error counters. Passive is usual while no charger is plugged in, because nobody acknowledges.", std::span<const ValueName>(names)); }
     see("Insulation", "Between battery and frame, as the insulation monitor has measured.", std::span<const ValueName>());
+    see("ChargerBusOffs", "Times that the charger's own bus was off since the start; it wraps.", std::span<const ValueName>());
   }
 };
 

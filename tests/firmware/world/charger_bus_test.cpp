@@ -1,6 +1,8 @@
 // The forklift board with a bus of its own for the charger (BMS_CHARGER_BUS=can2, 125 kbit/s), flashed image, in the
 // circuit of a truck whose own bus has 250 kbit/s.
+#include <array>
 #include <memory>
+#include <optional>
 #include <set>
 
 #include <gmock/gmock.h>
@@ -14,6 +16,18 @@ namespace {
 using ::testing::IsEmpty;
 
 enum class Protocol { elcon, cia418 };
+using Inputs = can::TruckInputs;
+
+/// What the board says about the charger's own bus.
+struct SeenInputs {
+  std::set<std::uint32_t> states;
+  std::uint32_t offs = 0;
+  void receive(const can::Frame& f) {
+    if (f.long_id || f.id != Inputs::id) return;
+    states.insert(Inputs::of(f).charger_bus);
+    offs = Inputs::of(f).charger_bus_offs;
+  }
+};
 
 class ChargerBus : public ::testing::TestWithParam<Protocol> {
  protected:
@@ -71,7 +85,8 @@ TEST_P(ChargerBus, ChargesFromPlugInToFullAndNeitherBusCarriesTheOthersMessages)
   const std::set<std::uint32_t>& of_profile = GetParam() == Protocol::elcon ? elcon : cia418;
   EXPECT_EQ(on_charger_bus, of_profile);
   EXPECT_GT(on_truck_bus.size(), 15U);
-  for (const std::uint32_t id : of_profile) EXPECT_FALSE(on_truck_bus.contains(id)) << std::hex << id;
+  constexpr std::uint32_t heartbeat = 0x701;  // of a node of either bus
+  for (const std::uint32_t id : of_profile) EXPECT_EQ(on_truck_bus.contains(id), id == heartbeat) << std::hex << id;
   expect_truck_bus_went_on();
 }
 
@@ -97,10 +112,16 @@ TEST_P(ChargerBus, ACutBusEndsTheChargeAsItsSilenceDoesAndTheTrucksBusGoesOn) {
 TEST_P(ChargerBus, ABusThatIsHeldLowOrDisturbedTakesNothingFromTheTrucksBusAndRecoversByItself) {
   plug_in(0.5);
   ASSERT_TRUE(charge->begins());
+  SeenInputs said;
+  charge->world().vehicle.on_frame = [&](const can::Frame& f) { said.receive(f); };
+  charge->run_s(2);
+  EXPECT_EQ(said.states, std::set<std::uint32_t>{Inputs::charger_bus_active});
+  EXPECT_EQ(said.offs, 0U);
   watch_truck_bus();
   bus().corrupt_sent = 40;  // 32 errors are a bus-off
   charge->run_s(3);
   EXPECT_GE(bus().times_off, 1U);
+  EXPECT_EQ(said.offs, bus().times_off) << "the truck sees it";
   EXPECT_TRUE(charge->gives()) << "it recovers before the charger gives up";
   bus().stuck_dominant = true;
   charge->run_s(12);
@@ -157,6 +178,47 @@ TEST_P(ChargerBus, MessagesOfTheTruckOnTheChargersBusAreNotObeyed) {
 
 INSTANTIATE_TEST_SUITE_P(Of, ChargerBus, ::testing::Values(Protocol::elcon, Protocol::cia418),
                          [](const auto& tested) { return tested.param == Protocol::elcon ? "Elcon" : "Cia418"; });
+
+class CanopenBuses : public ChargerBus {
+ protected:
+  /// Of the truck's bus, to node 1.
+  void send(std::uint32_t id, std::uint8_t length, const std::array<std::uint8_t, 8>& data) {
+    truck_bus().others.push_back({firmware::wire_frame({id, length, data}), 0, true});
+  }
+};
+
+/// A CANopen truck reads the battery's objects and watches its heartbeat, whichever bus the charger has.
+TEST_P(CanopenBuses, TheBatteryIsANodeOfTheTrucksBusTooAndATruckThatStopsItDoesNotStopTheCharge) {
+  plug_in(0.5);
+  ASSERT_TRUE(charge->begins());
+  std::optional<can::Frame> answer;
+  std::uint8_t state = 0;
+  charge->world().vehicle.on_frame = [&](const can::Frame& f) {
+    if (f.id == 0x581) answer = f;
+    if (f.id == 0x701) state = f.data[0];
+  };
+  const auto answered = [&] { return answer.has_value(); };
+  const std::array<std::uint8_t, 8> read_device_type{0x40, 0x00, 0x10}, stop_node{2, 1}, start_node{1, 1};
+  send(0x601, 8, read_device_type);
+  ASSERT_GE(charge->world().run_until(answered, 500), 0);
+  EXPECT_EQ(answer->data[0], 0x43);
+  EXPECT_EQ(answer->data[4] | answer->data[5] << 8, 418);
+  for (const firmware::SeenFrame& f : bus().seen) EXPECT_NE(f.frame.id, 0x581U) << "not on the charger's bus";
+  answer.reset();
+  send(0x000, 2, stop_node);
+  charge->run_s(2);
+  EXPECT_EQ(state, 4) << "stopped";
+  send(0x601, 8, read_device_type);
+  charge->run_s(1);
+  EXPECT_FALSE(answered());
+  EXPECT_TRUE(charge->gives()) << "the charger's node goes on";
+  send(0x000, 2, start_node);
+  charge->run_s(1);
+  EXPECT_EQ(state, 5);
+  charge->no_fault();
+}
+INSTANTIATE_TEST_SUITE_P(Of, CanopenBuses, ::testing::Values(Protocol::cia418),
+                         [](const auto&) { return std::string("Cia418"); });
 
 /// Parked: both buses are silent, so the chip stops between the samples; a charger's frame wakes it.
 TEST(ChargerBusAsleep, TheChipStopsWhileBothBusesAreSilentAndAFrameOfTheChargerWakesIt) {
