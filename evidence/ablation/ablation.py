@@ -29,7 +29,6 @@ GATES = {
     "share explained": "explained=0,explained_by_bursts=0",
     "far out": f"far_out={LARGE}",
     "one place": f"in_one_place={LARGE}",
-    "explains where it acts": "cause_explains=0",
     "gross error": f"gross_v={LARGE},gross_times={LARGE}",
     "least gross error": "gross_v=0",
     "law explains more": "few_causes=0",
@@ -49,7 +48,7 @@ GROUPS = {
     "search": ["resumed", "trades", "one class"],
     "all of one current and sizes": ["small next to others", "lasting error grows",
                                      "contact's wander", "end of a discharge", "implausible shapes"],
-    "adequacy": ["faint", "share explained", "far out", "explains where it acts"],
+    "adequacy": ["faint", "share explained", "far out"],
 }
 
 

@@ -28,7 +28,7 @@ Number number(std::string_view name, double& value) {
   return {name, [&value](double given) { value = given; }};
 }
 
-std::array<Number, 38> numbers() {
+std::array<Number, 37> numbers() {
   auto& d = thresholds.decision;
   auto& a = thresholds.adequacy;
   auto& p = thresholds.probability;
@@ -54,7 +54,6 @@ std::array<Number, 38> numbers() {
       number("slides_apart_soc", d.slides_apart_soc),
       number("trades", d.trades),
       number("in_one_place", d.in_one_place),
-      number("cause_explains", d.cause_explains),
       number("gross_v", d.gross_v),
       number("error_may_grow", d.error_may_grow),
       number("explained", a.explained),

@@ -90,10 +90,9 @@ double noise_floor_v(const NoiseModel& noise) {
 
 /// RMS errors of a cell file [V].
 struct Errors {
-  double file_v = 0;       ///< on the recordings
-  double tolerated_v = 0;  ///< that noise, the tolerance of the OCV and healthy recordings explain
-  double gross_v = 0;      ///< above it the file does not describe the cell, whatever its tolerance says
-  double certain_v = 0;    ///< above it something is wrong even if all that speaks for a cause lies in one place
+  double file_v = 0;     ///< on the recordings
+  double gross_v = 0;    ///< above it the file does not describe the cell, whatever its tolerance says
+  double certain_v = 0;  ///< above it something is wrong even if all that speaks for a cause lies in one place
 };
 
 /// covered: share of the recordings where healthy ones were. Their errors count also where they do not decide what is
@@ -102,13 +101,11 @@ Errors errors_of(const Search& search, const LikelihoodModel& likelihood, const 
   const double healthy_v = largest_error_v(options.healthy), times = thresholds.healthy.gross_times,
                times_there = std::max(times, error_factor(covered, options.false_alarm_rate)),
                tolerated_v = std::hypot(noise_floor_v(search.nominal_noise()), likelihood.cell().tolerance.ocv_v);
-  return {plain_error_v(likelihood, likelihood.base()), std::max(tolerated_v, times * healthy_v),
-          std::max(thresholds.decision.gross_v, times_there * healthy_v),
+  return {plain_error_v(likelihood, likelihood.base()), std::max(thresholds.decision.gross_v, times_there * healthy_v),
           thresholds.decision.certain_times * std::max(tolerated_v, healthy_v)};
 }
 
-Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contributions& contributed,
-                   const Errors& errors) {
+Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Errors& errors) {
   const std::vector<Finding>& findings = d.findings;
   if (adequacy.unknown) return Verdict::unknown;
   const bool comparable =
@@ -116,9 +113,6 @@ Verdict verdict_of(const Adequacy& adequacy, const Diagnosis& d, const Contribut
   const bool gross = errors.file_v > errors.certain_v || (comparable && errors.file_v > errors.gross_v);
   if (!adequacy.found && gross) return Verdict::unknown;
   if (!adequacy.found) return more_healthy_data_would_decide(d) ? Verdict::not_testable : Verdict::no_mismatch;
-  if (contributed.explained_where_it_acts < thresholds.decision.cause_explains &&
-      contributed.remaining_rmse_v > errors.tolerated_v)
-    return Verdict::unknown;
   if (findings.size() > 1) return Verdict::causes;
   return findings.front().equivalent_to.empty() ? Verdict::cause : Verdict::ambiguous;
 }
@@ -290,7 +284,7 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
   add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
   const Errors errors = errors_of(search, likelihood, options, d.healthy ? d.healthy->covered.share : 1);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
-  d.verdict = verdict_of(adequacy, d, contributed, errors);
+  d.verdict = verdict_of(adequacy, d, errors);
   if (search.stopped()) leave_unfinished(search, scope, d);
   add_numbers(adequacy, search.nominal_noise(), d);
   if (!options.learns) add_law_term(likelihood, search.nominal_noise(), judge_healthy.has_value(), d);

@@ -94,25 +94,6 @@ std::optional<Regime> sharpest_range(const Axis& axis, const std::vector<double>
   return sharpest > location_limits.regime_sharper ? std::optional(best) : std::nullopt;
 }
 
-/// Share of the squared error, less noise, that is gone in the rows with energy.
-double explained_where(const LikelihoodModel& likelihood, const HypothesisFit& base, const HypothesisFit& fit,
-                       const std::vector<std::vector<double>>& energy) {
-  double before = 0, after = 0, white = 0;
-  for (std::size_t r = 0; r < energy.size(); ++r) {
-    const double enough = peak_of(energy[r]) / location_limits.peak_over_energy;
-    const std::vector<double> without_v = likelihood.voltage(base.hypothesis, base.calibration, r),
-                              with_v = likelihood.voltage(fit.hypothesis, fit.calibration, r);
-    for (std::size_t k = 0; k < energy[r].size(); ++k) {
-      if (!(energy[r][k] > 0 && energy[r][k] >= enough) || likelihood.usable(r)[k] == 0) continue;
-      const double v = likelihood.records()[r].voltage_v[k];
-      before += (v - without_v[k]) * (v - without_v[k]);
-      after += (v - with_v[k]) * (v - with_v[k]);
-      white += likelihood.noise().white_v * likelihood.noise().white_v;
-    }
-  }
-  return before > white ? std::clamp((before - after) / (before - white), 0.0, 1.0) : 1;
-}
-
 }  // namespace
 
 double explained_share(double error_v, double remaining_v, double white_v) {
@@ -141,7 +122,6 @@ Contributions contributions(const LikelihoodModel& likelihood, const HypothesisF
     }
   }
   for (auto& [m, sum] : c.rms_v) sum = std::sqrt(sum / static_cast<double>(likelihood.readings()));
-  c.explained_where_it_acts = explained_where(likelihood, base, fit, c.energy);
   c.spans = strongest_spans(likelihood.records().front(), c.energy.front());
   return c;
 }

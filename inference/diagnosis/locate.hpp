@@ -15,7 +15,6 @@ struct Contributions {
   std::vector<std::vector<double>> energy;  ///< by record and row, of all of them together [V^2]
   std::vector<model::Span> spans;           ///< of the first record
   double explained_share = 0;               ///< of the squared error of the calibration, less noise, that is gone
-  double explained_where_it_acts = 0;       ///< the same over the rows in which they act (Location::peak_over_energy)
   double remaining_rmse_v = 0;              ///< measured less extended model, base parameters fitted [V]
 };
 

@@ -239,7 +239,6 @@ struct Thresholds {
                                    ///< twelfth of a recording, if the rest gains less than `detected`. Most of it:
                                    ///< not tuned. Without healthy data 29 of 68 healthy discharges of NASA cells
                                    ///< had a cause, with it 4; of 49 with effects it costs 1 (development split)
-    double cause_explains = 0.1;   ///< share of the squared error, where it acts, that a cause explains at least
     double gross_v = 0.1;          ///< [V] RMS error above which a cell is never called healthy, whatever the tolerance
     double certain_times = 10;     ///< of the error that healthy recordings show or the tolerance states, above which
                                    ///< something is wrong, also if all that speaks for a cause lies in one place.
