@@ -20,7 +20,7 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 
 PulseModel BoardCell::pulse_model(const Estimator& estimator, const Snapshot<Estimator, cells>& now) {
   if constexpr (std::is_same_v<Pulses, PulsePublisher>) {
-    static BoardTables with_limits_of_pulses;  // too large for the stack
+    static BoardTables with_limits_of_pulses = tables();  // too large for the stack
     with_limits_of_pulses = tables();
     return firmware::pulse_model(with_limits_of_pulses, estimator, now);
   }

@@ -9,7 +9,7 @@
 
 namespace bms::images {
 
-/// Options of CMake (cmake/firmware.cmake), and a name for their build folders.
+/// Options of CMake (cmake/firmware.cmake), and a name for their build folders: other options need another name.
 struct Choice {
   std::string name;
   std::vector<std::string> options;

@@ -50,7 +50,7 @@ Pack pack_with_charger_bus(const std::string& vehicle_profile) {
   const files::CellFile cell = scaled(truck_ah);
   return {truck_ah, cell.parameters.limits.discharge_current_max_a, 16,
           images::chosen_image("stm32f405_forklift", cell,
-                               {vehicle_profile + "-can2",
+                               {fmt::format("{}-can2-{}", vehicle_profile, own_charger_bit_rate),
                                 {"-DBMS_VEHICLE_PROFILE=" + vehicle_profile, "-DBMS_CHARGER_BUS=can2",
                                  fmt::format("-DBMS_CHARGER_BIT_RATE={}", own_charger_bit_rate)}})};
 }
