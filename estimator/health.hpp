@@ -66,7 +66,6 @@ template <class S>
 class CapacityHealth {
   using Soc = arithmetic::Soc<S>;
   using Variance = arithmetic::Variance<S>;
-  using Fraction = arithmetic::Fraction<S>;
 
  public:
   static constexpr double initial_sigma = 1e-6 * measurement::StartingCapacity{}.sigma_ppm;
@@ -164,7 +163,6 @@ template <class S>
 class ResistanceHealth {
   using Voltage = arithmetic::Voltage<S>;
   using Variance = arithmetic::Variance<S>;
-  using Fraction = arithmetic::Fraction<S>;
   using Soc = arithmetic::Soc<S>;
 
  public:

@@ -31,6 +31,16 @@ std::string short_drive(const std::filesystem::path& folder) {
 
 Json of(const ToolRun& r) { return Json::parse(r.out); }
 
+/// The one fault of the run was reported in its time.
+void expect_reported_in_time(const ToolRun& r) {
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const Json j = of(r);
+  ASSERT_EQ(j["reactions"].size(), 1U);
+  EXPECT_TRUE(j["reactions"][0]["in_time"]) << j["reactions"].dump() << j["faults"].dump();
+  EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
+  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+}
+
 class Hil : public ::testing::TestWithParam<const char*> {
  protected:
   /// The forklift board in the loop with that load; the result is JSON on standard output.
@@ -91,13 +101,7 @@ TEST_F(HilOf80Volts, ADriveWithoutFaultsRaisesNoFaultAndPublishesTheTrueSoc) {
   EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
 }
 TEST_P(HilOf80Volts, AnInjectedFaultOfEitherHalfIsReportedInTime) {
-  const auto r = drive(std::string("--fault ") + GetParam());
-  EXPECT_EQ(r.exit_code, 0) << r.err;
-  const Json j = of(r);
-  ASSERT_EQ(j["reactions"].size(), 1U);
-  EXPECT_TRUE(j["reactions"][0]["in_time"]) << j["reactions"].dump() << j["faults"].dump();
-  EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
-  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+  expect_reported_in_time(drive(std::string("--fault ") + GetParam()));
 }
 INSTANTIATE_TEST_SUITE_P(Faults, HilOf80Volts,
                          ::testing::Values("cell_high=1@60", "cell_open=24@60", "sense_wire=12@60"), [](const auto& i) {
@@ -115,13 +119,7 @@ TEST_F(Hil, IsReproducible) {
 
 class HilFault : public Hil {};
 TEST_P(HilFault, AnInjectedFaultIsReportedInTime) {
-  const auto r = loop(std::string("--initial-soc 0.6 --announced-soc 0.6 --fault ") + GetParam());
-  EXPECT_EQ(r.exit_code, 0) << r.err;
-  const Json j = of(r);
-  ASSERT_EQ(j["reactions"].size(), 1U);
-  EXPECT_TRUE(j["reactions"][0]["in_time"]) << j["reactions"].dump() << j["faults"].dump();
-  EXPECT_TRUE(j["reactions"][0]["after_s"].is_number()) << j["faults"].dump();
-  EXPECT_EQ(j["soc"]["wrong_told_as_valid"], 0);
+  expect_reported_in_time(loop(std::string("--initial-soc 0.6 --announced-soc 0.6 --fault ") + GetParam()));
 }
 INSTANTIATE_TEST_SUITE_P(Faults, HilFault,
                          ::testing::Values("cell_stuck=3@60", "cell_open=7@60", "sense_wire=5@60", "cell_high=1@60",

@@ -220,13 +220,21 @@ TEST_P(CanopenBuses, TheBatteryIsANodeOfTheTrucksBusTooAndATruckThatStopsItDoesN
 INSTANTIATE_TEST_SUITE_P(Of, CanopenBuses, ::testing::Values(Protocol::cia418),
                          [](const auto&) { return std::string("Cia418"); });
 
-/// Parked: both buses are silent, so the chip stops between the samples; a charger's frame wakes it.
-TEST(ChargerBusAsleep, TheChipStopsWhileBothBusesAreSilentAndAFrameOfTheChargerWakesIt) {
+/// A parked battery whose charger does not listen.
+class ChargerBusAsleep : public ::testing::Test {
+ protected:
+  ChargerBusAsleep() {
+    world.fit_clock();
+    world.fit_charger_bus(own_charger_bit_rate);
+    world.charger_bus->can.others_acknowledge = false;
+  }
+
   const Pack pack = pack_with_charger_bus("elcon");
-  TruckWorld world(pack.image, typical_setup(pack));
-  world.fit_clock();
-  world.fit_charger_bus(own_charger_bit_rate);
-  world.charger_bus->can.others_acknowledge = false;
+  TruckWorld world{pack.image, typical_setup(pack)};
+};
+
+/// Parked: both buses are silent, so the chip stops between the samples; a charger's frame wakes it.
+TEST_F(ChargerBusAsleep, TheChipStopsWhileBothBusesAreSilentAndAFrameOfTheChargerWakesIt) {
   world.silence_bus(true);
   world.run_ms(13'000);
   const unsigned stops = world.board.stops;
@@ -259,12 +267,7 @@ TEST(ChargerBusAsleep, TheChipStopsWhileBothBusesAreSilentAndAFrameOfTheChargerW
 }
 
 /// A node of one bus that talks keeps the controllers of both buses on: none leaves its bus ten times a second.
-TEST(ChargerBusAsleep, ATruckThatTalksKeepsTheControllerOfTheChargerOnItsBus) {
-  const Pack pack = pack_with_charger_bus("elcon");
-  TruckWorld world(pack.image, typical_setup(pack));
-  world.fit_clock();
-  world.fit_charger_bus(own_charger_bit_rate);
-  world.charger_bus->can.others_acknowledge = false;
+TEST_F(ChargerBusAsleep, ATruckThatTalksKeepsTheControllerOfTheChargerOnItsBus) {
   world.run_ms(15'000);
   EXPECT_EQ(world.board.stops, 0U);
   unsigned off = 0;
