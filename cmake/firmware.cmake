@@ -213,18 +213,26 @@ endfunction()
 
 set(BMS_SHARED_OBJECTS "" CACHE PATH "build of this board whose objects are linked if no cell decides on them")
 set(shared_objects "")
-# bms_shared_objects(NAME OPTIMISATION SOURCE...): no source depends on the cell. NAME.objects lists them for others.
+# bms_import_objects(NAME): NAME as the other build has compiled it
+function(bms_import_objects name)
+  set(list ${BMS_SHARED_OBJECTS}/${name}.objects)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
+  file(STRINGS ${list} objects)
+  add_library(${name} OBJECT IMPORTED)
+  set_target_properties(${name} PROPERTIES IMPORTED_OBJECTS "${objects}")
+endfunction()
+# bms_list_objects(NAME): NAME.objects lists them for others
+function(bms_list_objects name)
+  file(GENERATE OUTPUT ${build}/${name}.objects CONTENT "$<JOIN:$<TARGET_OBJECTS:${name}>,\n>\n")
+endfunction()
+# bms_shared_objects(NAME OPTIMISATION SOURCE...): no source depends on the cell
 function(bms_shared_objects name optimisation)
   if(BMS_SHARED_OBJECTS)
-    set(list ${BMS_SHARED_OBJECTS}/${name}.objects)
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${list})
-    file(STRINGS ${list} objects)
-    add_library(${name} OBJECT IMPORTED)
-    set_target_properties(${name} PROPERTIES IMPORTED_OBJECTS "${objects}")
+    bms_import_objects(${name})
   else()
     bms_objects(${name} ${optimisation} ${ARGN})
+    bms_list_objects(${name})
     set(shared_objects ${shared_objects} ${name} PARENT_SCOPE)
-    file(GENERATE OUTPUT ${build}/${name}.objects CONTENT "$<JOIN:$<TARGET_OBJECTS:${name}>,\n>\n")
   endif()
 endfunction()
 
@@ -258,8 +266,8 @@ bms_shared_objects(hal_chip -Os ${core}/finish.cpp ${on_the_chip} ${chip_flash} 
   ${chip_secrets})
 bms_shared_objects(hal_emulated -Os ${hal}/emulated/semihosting.cpp ${in_emulation} ${absent_hal}/device_key.cpp
   ${absent_hal}/random.cpp)
-bms_objects(development_image -Os ${hal}/image_kind/development.cpp)
-bms_objects(product_image -Os ${hal}/image_kind/product.cpp)
+bms_shared_objects(development_image -Os ${hal}/image_kind/development.cpp)
+bms_shared_objects(product_image -Os ${hal}/image_kind/product.cpp)
 set(image_kind development_image)
 if(BMS_PRODUCTION)
   set(image_kind product_image)
@@ -290,10 +298,10 @@ set(samples_emulated ${hal}/emulated/samples_can.cpp ${hal}/frame_dispatch.cpp $
 set(samples_remote ${hal}/remote/samples.cpp ${absent_hal}/sleep.cpp ${hal}/frame_dispatch.cpp ${no_chain})
 set(samples_adc ${hal}/adc/samples.cpp ${hal}/frame_dispatch.cpp ${chip}/adc.cpp ${chip}/contactor_pins.cpp
   ${absent_hal}/second_line.cpp ${absent_hal}/auxiliary_contacts.cpp ${absent_hal}/second_current.cpp ${no_truck})
-# The settings of the chip's own protections follow the cell file.
-set(samples_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
-  ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp ${root}/firmware/front_end/settings.cpp ${cell_header}
-  ${chip}/i2c.cpp ${chip}/sleep.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp
+# The settings of the chip's own protections follow the cell file; what stands around them is shared.
+set(front_end_bq76952 ${hal}/bq76952/samples.cpp ${hal}/frame_dispatch.cpp ${hal}/bq76952/front_end.cpp
+  ${hal}/bq76952/second_line.cpp ${hal}/bq76952/wire.cpp)
+set(samples_bq76952 ${chip}/i2c.cpp ${chip}/sleep.cpp ${chip}/contactor_pins.cpp ${hal}/adc/dc_link.cpp ${chip}/adc.cpp
   ${auxiliary_contacts} ${second_current} ${truck_pins} ${insulation})
 # More than 16 cells have two chips, each on a bus of its own.
 set(isolated_bus "")
@@ -321,11 +329,13 @@ bms_shared_objects(hal_remote_samples -Os ${samples_remote})
 if(BMS_SAMPLES MATCHES "^(bq76952|adc)$")  # the board measures itself
   list(APPEND samples_${BMS_SAMPLES} ${absent_hal}/starting_point.cpp)
 endif()
+set(samples hal_samples)
 if(BMS_SAMPLES STREQUAL "bq76952")
-  bms_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
-else()
-  bms_shared_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
+  bms_shared_objects(hal_front_end -Os ${front_end_bq76952})
+  bms_objects(front_end_settings -Os ${root}/firmware/front_end/settings.cpp ${cell_header})
+  set(samples hal_front_end front_end_settings hal_samples)
 endif()
+bms_shared_objects(hal_samples -Os ${samples_${BMS_SAMPLES}})
 bms_shared_objects(hal_emulated_flash -Os ${emulated_flash} ${hal}/emulated/calendar.cpp)
 set(no_hardware watchdog flash calendar board_state supply)
 list(TRANSFORM no_hardware PREPEND ${absent_hal}/)
@@ -420,10 +430,10 @@ set(portable ${program} ${image_kind})
 # bms_applications(ENDING): the application; of a board with a chip also the one that is fed over CAN
 function(bms_applications ending)
   if(BMS_EMULATED)
-    bms_image(bms_${BMS_BOARD}${ending} hal_core hal_clock hal_emulated hal_emulated_flash hal_board hal_samples
+    bms_image(bms_${BMS_BOARD}${ending} hal_core hal_clock hal_emulated hal_emulated_flash hal_board ${samples}
       ${portable} ${of_a_slot})
   else()
-    bms_image(bms_${BMS_BOARD}${ending} ${on_chip} ${second_can} hal_samples ${isolated_bus} ${portable}
+    bms_image(bms_${BMS_BOARD}${ending} ${on_chip} ${second_can} ${samples} ${isolated_bus} ${portable}
       ${of_a_slot})
     bms_image(bms_${BMS_BOARD}_remote${ending} ${on_chip} ${second_can} hal_remote_samples ${portable} ${of_a_slot})
   endif()
@@ -457,7 +467,7 @@ if(NOT BMS_EMULATED)
 endif()
 bms_image(bms_${BMS_BOARD}_replay hal_core hal_clock hal_emulated hal_stream ${portable})
 bms_image(bms_${BMS_BOARD}_hil hal_core hal_emulated hal_hil ${portable})
-bms_image(bms_${BMS_BOARD}_bench ${on_chip} hal_samples ${portable})
+bms_image(bms_${BMS_BOARD}_bench ${on_chip} ${samples} ${portable})
 
 # bms_test_image(NAME OPTIMISATION SOURCE...): NAME_image.cpp of tests/firmware as the image bms_<board>_NAME
 function(bms_test_image name optimisation)

@@ -159,7 +159,11 @@ class BuildFolder {
     run_step(configure, log());
   }
 
-  void build(const std::string& target) const { run_step({"ninja", "-C", path_.string(), target}, log()); }
+  void build(const std::vector<std::string>& targets) const {
+    std::vector<std::string> command = {"ninja", "-C", path_.string()};
+    command.insert(command.end(), targets.begin(), targets.end());
+    run_step(command, log());
+  }
 
  private:
   std::filesystem::path log() const { return path_ / "build.log"; }
@@ -170,10 +174,11 @@ class BuildFolder {
 };
 
 /// Compiles what the cell does not decide on in an image. Returns the build folder.
-std::filesystem::path shared_objects(const SourceTree& sources, const Variant& variant, const std::string& image_name) {
+std::filesystem::path shared_objects(const SourceTree& sources, const Variant& variant,
+                                     const std::vector<std::string>& targets) {
   const BuildFolder folder(sources, variant.board + variant.ending());
   if (folder.is_new()) folder.configure(variant, {});
-  folder.build(image_name + "_shared");
+  folder.build(targets);
   return folder.path();
 }
 
@@ -184,8 +189,10 @@ std::filesystem::path build(const SourceTree& sources, const Variant& variant, c
   }
   const auto name_of = [&](Image of) { return fmt::format("bms_{}{}", variant.board, ending(of)); };
   const std::string image_name = name_of(image);
-  const auto shared = shared_objects(sources, variant, name_of(without_slot(image)));
   const bool in_a_slot = without_slot(image) != image;
+  std::vector<std::string> targets = {name_of(without_slot(image)) + "_shared"};
+  if (in_a_slot) targets.push_back(fmt::format("bms_{}_update_shared", variant.board));
+  const auto shared = shared_objects(sources, variant, targets);
   const BuildFolder folder(sources, fmt::format("{}-{}-{:08x}{}{}", variant.board, cell.name, cell.hash,
                                                 variant.ending(), in_a_slot ? "-slots" : ""));
   const auto cell_path = folder.path() / "cell.toml";
@@ -196,7 +203,7 @@ std::filesystem::path build(const SourceTree& sources, const Variant& variant, c
     folder.configure(variant, {"-DBMS_CELL=" + cell_path.string(), "-DBMS_SHARED_OBJECTS=" + shared.string(),
                                std::string("-DBMS_SLOT=") + (in_a_slot ? "a;b" : "")});
   }
-  folder.build(image_name + ".elf");
+  folder.build({image_name + ".elf"});
   return folder.path() / (image_name + ".elf");
 }
 
