@@ -7,11 +7,11 @@
 #include "files/committed_figures.hpp"
 #include "files/text_file.hpp"
 #include "images/child_process.hpp"
-#include "images/chosen_image.hpp"
 #include "images/firmware_image.hpp"
 #include "images/image_file.hpp"
 #include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/elf_image.hpp"
+#include "tests/firmware/rated_cell.hpp"
 #include "tests/firmware/stack_depth.hpp"
 
 namespace bms::firmware {
@@ -69,37 +69,10 @@ TEST(ForkliftBudgets, OfAnImageInASlotAre28KilobytesOfRamAndTheStackAboveItsGuar
   EXPECT_LE(worst, stack);
 }
 
-/// The driver once more, for CAN2, and its queue and ring; the stack of an image with one bus.
-TEST(ForkliftBudgets, HoldForAChargerBusOfItsOwnWithBothProtocols) {
-  const BoardBudget budget = budget_of("stm32f405_forklift");
-  const files::CellFile cell = files::read_cell("table9");
-  for (const std::string profile : {"elcon", "cia418"}) {
-    const auto one = images::firmware_image("stm32f405_forklift", cell, images::Image::application, profile),
-               two = images::chosen_image(
-                   "stm32f405_forklift", cell,
-                   {profile + "-can2", {"-DBMS_VEHICLE_PROFILE=" + profile, "-DBMS_CHARGER_BUS=can2"}});
-    const ImageSize of_one = size_of(one), of_two = size_of(two);
-    const std::uint64_t flash = of_two.text + of_two.data, ram = of_two.data + of_two.bss,
-                        worst = stack_depth(two).worst();
-    std::printf("%s on CAN2: %zu bytes of flash (%zu more), %zu of RAM (%zu more), at worst %zu of stack\n",
-                profile.c_str(), static_cast<std::size_t>(flash),
-                static_cast<std::size_t>(flash - of_one.text - of_one.data), static_cast<std::size_t>(ram),
-                static_cast<std::size_t>(ram - of_one.data - of_one.bss), static_cast<std::size_t>(worst));
-    EXPECT_LE(flash, budget.flash);
-    EXPECT_LE(ram, budget.ram);
-    EXPECT_LE(worst, budget.stack);
-    EXPECT_TRUE(forbidden_in(symbols_of(two)).empty());
-  }
-}
-
 /// What the model says about pulses has tables of its own in RAM, because they are too large for the stack.
 TEST(ForkliftBudgets, HoldForACellFileThatRatesPulses) {
   const BoardBudget budget = budget_of("stm32f405_forklift");
-  files::CellFile rated = files::read_cell("table9");
-  rated.pulses.discharge = {.for_10s_a = 18, .for_30s_a = 12};
-  rated.name = "table9_pulses";
-  const auto image = images::firmware_image(
-      "stm32f405_forklift", files::parse_cell(files::cell_text(rated), rated.name), images::Image::application);
+  const auto image = images::firmware_image("stm32f405_forklift", table9_rated(), images::Image::application);
   const ImageSize size = size_of(image);
   const std::uint64_t worst = stack_depth(image).worst();
   std::printf("%zu bytes of flash, %zu of RAM, at worst %zu of stack\n",
@@ -108,19 +81,6 @@ TEST(ForkliftBudgets, HoldForACellFileThatRatesPulses) {
   EXPECT_LE(size.text + size.data, budget.flash);
   EXPECT_LE(size.data + size.bss, budget.ram);
   EXPECT_LE(worst, budget.stack);
-}
-
-/// With cia418 it is above the budget; boards/stm32f405_80v/README.md states by how much.
-TEST(BudgetsOf80Volts, HoldForAChargerBusOfItsOwnWithElcon) {
-  const BoardBudget budget = budget_of("stm32f405_80v");
-  const auto two = images::chosen_image("stm32f405_80v", files::read_cell("table9"),
-                                        {"elcon-can2", {"-DBMS_VEHICLE_PROFILE=elcon", "-DBMS_CHARGER_BUS=can2"}});
-  const ImageSize size = size_of(two);
-  std::printf("elcon on CAN2: %zu bytes of flash, %zu of RAM\n", static_cast<std::size_t>(size.text + size.data),
-              static_cast<std::size_t>(size.data + size.bss));
-  EXPECT_LE(size.text + size.data, budget.flash);
-  EXPECT_LE(size.data + size.bss, budget.ram);
-  EXPECT_LE(stack_depth(two).worst(), budget.stack);
 }
 
 // instructions as objdump prints them

@@ -4,6 +4,7 @@
 
 #include "can_messages.hpp"  // generated from firmware/can/greybox_bms.dbc
 #include "tests/firmware/bxcan_board.hpp"
+#include "tests/firmware/rated_cell.hpp"
 
 namespace bms::firmware {
 namespace {
@@ -67,12 +68,7 @@ TEST(PackOf15Cells, SendsTheSixteenthAsNotKnownAndDetectsOvervoltageOfTheLast) {
 
 /// Only of a cell file that rates pulses. Nothing is closed here, so nothing may flow.
 TEST(PackOfARatedCell, SendsPulseCurrentsAndAnotherOneDoesNot) {
-  files::CellFile rated = table9();
-  rated.pulses.discharge = {.for_10s_a = 18, .for_30s_a = 12};
-  rated.pulses.charge = {.for_10s_a = 9};
-  rated.name = "table9_rated";
-  const auto with = images::firmware_image("stm32f405_forklift", files::parse_cell(files::cell_text(rated), rated.name),
-                                           images::Image::remote);
+  const auto with = images::firmware_image("stm32f405_forklift", table9_rated(), images::Image::remote);
   const ImageSize size = expect_within_budgets(with), plain = size_of(image());
   fmt::print("{} bytes of flash and {} of RAM more\n", size.text + size.data - plain.text - plain.data,
              size.data + size.bss - plain.data - plain.bss);
