@@ -165,7 +165,7 @@ class FailureCase {
       : pack_(pack),
         failure_(failure),
         world_(pack.image, setup),
-        judge_(world_, rows(pack.cells), pack.limit_a),
+        judge_(world_, rows(pack), pack.limit_a),
         outcome_(outcome) {
     judge_.allowed = ~std::uint64_t{0};
     world_.each_step = [this] { judge_.step(); };
@@ -189,8 +189,8 @@ class FailureCase {
   }
 
  private:
-  static std::vector<Row> rows(std::size_t cells) {
-    return promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", truck_ah / printed_ah, cells);
+  static std::vector<Row> rows(const Pack& pack) {
+    return promised_rows(BMS_SOURCE_DIR "/firmware/protection/README.md", pack.capacity_ah / printed_ah, pack.cells);
   }
 
   /// Closed by the outputs, and not by a weld.
@@ -248,7 +248,7 @@ class FailureCase {
 }  // namespace
 
 Result run_contact_failures(const Extent& extent) {
-  const Pack pack = pack_of(truck_ah, extent.cells);
+  const Pack pack = pack_of(extent.capacity_ah, extent.cells);
   std::vector<Failure> failures = contactor_failures();
   for (Failure& failure : other_failures()) failures.push_back(std::move(failure));
   Cases cases(extent.at_once);

@@ -26,6 +26,8 @@ struct Extent {
   std::size_t days = 30;   ///< of the month
   std::size_t cells = 16;  ///< in series
   unsigned at_once = 2;
+  /// Of a cell in the contact failures.
+  double capacity_ah = truck_ah;
   bool continues = false;     ///< good outcomes of an earlier run with the same image and seed count
   bool only_kept = false;     ///< runs nothing: the table of the outcomes that are known
   std::size_t from = 0;       ///< leaves so many cases to other parts

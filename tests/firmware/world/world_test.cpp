@@ -30,8 +30,10 @@ TEST(World, AWeldedMainContactorIsFoundBeforeTheNextStart) {
   expect_good(run_contact_failures(some(0, "K1 welds while driving|K2 welds while driving")));
 }
 
+/// With the cells of the other tests here: no image of its own.
 TEST(World, ABurntOrShortedPrechargeResistorIsFound) {
-  expect_good(run_contact_failures(some(0, "resistor burnt|resistor shorted")));
+  expect_good(
+      run_contact_failures({.only = "resistor burnt|resistor shorted", .at_once = 2, .capacity_ah = printed_ah}));
 }
 
 TEST(World, DipsOfTheSupplyNeverCloseAMainContactOnAnEmptyDcLink) { expect_good(run_supply_dips(some(12))); }
