@@ -18,12 +18,8 @@ namespace {
 using plant::Relay;
 using ::testing::IsEmpty;
 
-const Pack& pack() {
-  static const Pack built = pack_of(truck_ah, 24);
-  return built;
-}
 /// The image whose budget board_budget_test measures.
-const Pack& small_pack() {
+const Pack& pack() {
   static const Pack built = pack_of(printed_ah, 24);
   return built;
 }
@@ -41,9 +37,9 @@ void expect_clean(const TruckWorld& world) {
 }
 
 TEST(StackedWorld, DrivesChargesAndOpensForItsHighestCell) {
-  TruckWorld world(small_pack().image, typical_setup(small_pack()));
+  TruckWorld world(pack().image, typical_setup(pack()));
   for (const Operating state : {Operating::drive, Operating::charge, Operating::recuperate}) {
-    ASSERT_EQ(bring_to(world, small_pack(), state), "");
+    ASSERT_EQ(bring_to(world, pack(), state), "");
     EXPECT_EQ(fault_names(world.vehicle.faults_seen()), "none") << name_of(state);
     if (state == Operating::recuperate) break;
     EXPECT_GE(key_off(world), 0) << name_of(state);
@@ -61,11 +57,12 @@ TEST(StackedWorld, DrivesChargesAndOpensForItsHighestCell) {
 
 /// Driving, lifting, recuperation and pauses with noise on all readings. BMS_WORLD_MINUTES: another duration than 20.
 TEST(StackedWorld, TwentyMinutesOfATruckHaveNoFault) {
-  TruckWorld world(pack().image, typical_setup(pack()));
+  const Pack truck = pack_of(truck_ah, 24);
+  TruckWorld world(truck.image, typical_setup(truck));
   world.set_noise(0.0015, 5e-6);
   plant::Random random(11);
   const auto between = [&](double least, double most) { return least + random.uniform() * (most - least); };
-  ASSERT_EQ(bring_to(world, pack(), Operating::standby), "");
+  ASSERT_EQ(bring_to(world, truck, Operating::standby), "");
   const double begun_ms = world.now_ms();
   const char* minutes = std::getenv("BMS_WORLD_MINUTES");
   const double end_ms = begun_ms + 60e3 * (minutes == nullptr ? 20 : std::atof(minutes));
@@ -80,7 +77,7 @@ TEST(StackedWorld, TwentyMinutesOfATruckHaveNoFault) {
     }
     const bool recuperates = random.uniform() < 0.25;
     const double most_a = recuperates ? world.vehicle.allowed_charge_a() : world.vehicle.allowed_discharge_a();
-    const double a = std::min(pack().limit_a, most_a) * between(0, 0.6);
+    const double a = std::min(truck.limit_a, most_a) * between(0, 0.6);
     set_drive_a(world, recuperates ? 0.5 * a : -a);
     world.run_ms(1e3 * between(0.5, 12));
     ++looked;
