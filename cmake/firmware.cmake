@@ -48,7 +48,7 @@
 #
 # Whatever does not depend on the cell is compiled once for all images of this build. Builds of the same board with
 # other cells link it from there: -DBMS_SHARED_OBJECTS=FOLDER, a build with the same options, in which target
-# IMAGE_shared compiles what an image takes.
+# IMAGE_shared compiles what an image takes, and bms_<board>_update_shared what one in a slot takes besides.
 set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP
