@@ -1,15 +1,12 @@
 // A leak from a tap of 24 cells to the frame, at the split of the two chips and at both ends: what a monitor at the
 // board's input makes the flashed image report and do, and what the leak does to the tests of the contactors.
-#include <cmath>
 #include <cstdio>
-#include <limits>
 #include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "tests/firmware/world/operating.hpp"
-#include "tests/firmware/world/promise.hpp"
 
 namespace bms::world {
 namespace {
