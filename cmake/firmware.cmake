@@ -204,6 +204,10 @@ add_link_options(${BMS_CPU_FLAGS} -nostartfiles --specs=nano.specs --specs=nosys
 
 include(${root}/cmake/can_messages.cmake)
 
+if(BMS_CELLS LESS_EQUAL 24)
+  add_compile_definitions(BMS_STORED_CELLS=24)
+endif()
+
 # bms_objects(NAME OPTIMISATION SOURCE...)
 function(bms_objects name optimisation)
   add_library(${name} OBJECT ${ARGN})

@@ -167,6 +167,11 @@ constexpr can::CellExtremes cell_extremes(const measurement::PackSample<Cells>& 
   }
   m.highest_voltage = volts(highest_uv);
   m.lowest_voltage = m.lowest_cell == no_cell ? can::unknown : volts(lowest_uv);
+  if constexpr (Cells >= no_cell) {  // the signals have no number for cells 31 and 32
+    if (highest_uv >= 0) m.lowest_voltage = volts(lowest_uv);
+    m.highest_cell = std::min(m.highest_cell, no_cell);
+    m.lowest_cell = std::min(m.lowest_cell, no_cell);
+  }
   m.soc_spread = 100.0F * (fullest - emptiest);
   return m;
 }

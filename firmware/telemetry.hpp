@@ -170,7 +170,7 @@ class Telemetry {
   }
 
   void publish_cells(const Snapshot<Estimator, Cells>& now) {
-    static_assert(Cells <= 24, "further cells have no message");
+    static_assert(Cells <= 32, "further cells have no message");
     send_if_due<can::CellVoltages1>([&] { return messages::cell_voltages<can::CellVoltages1, 0>(now.pack); });
     if constexpr (Cells > 4)
       send_if_due<can::CellVoltages2>([&] { return messages::cell_voltages<can::CellVoltages2, 4>(now.pack); });
@@ -182,6 +182,10 @@ class Telemetry {
       send_if_due<can::CellVoltages5>([&] { return messages::cell_voltages<can::CellVoltages5, 16>(now.pack); });
     if constexpr (Cells > 20)
       send_if_due<can::CellVoltages6>([&] { return messages::cell_voltages<can::CellVoltages6, 20>(now.pack); });
+    if constexpr (Cells > 24)
+      send_if_due<can::CellVoltages7>([&] { return messages::cell_voltages<can::CellVoltages7, 24>(now.pack); });
+    if constexpr (Cells > 28)
+      send_if_due<can::CellVoltages8>([&] { return messages::cell_voltages<can::CellVoltages8, 28>(now.pack); });
     if constexpr (Cells > messages::max_cells_of_pack_electrical)
       send_if_due<can::PackVoltage>([&] { return messages::pack_voltage(now.pack); });
     send_if_due<can::CellExtremes>([&] { return messages::cell_extremes(now.pack, now.cells); });
@@ -220,9 +224,11 @@ class Telemetry {
 
   messages::Identity identity_;
   std::optional<measurement::StartingPoint> start_;
-  /// Of all but the last, PulseCurrents (firmware/pulse_currents.hpp); a tuple takes 800 bytes of code to initialise.
-  static constexpr std::size_t messages = std::tuple_size_v<can::Messages> - 1;
-  static_assert(std::is_same_v<std::tuple_element_t<messages, can::Messages>, can::PulseCurrents>);
+  /// Of those before PulseCurrents, which firmware/pulse_currents.hpp sends; with more than 24 cells also of those
+  /// behind it, which are cells 25 to 32. A tuple takes 800 bytes of code to initialise.
+  static constexpr std::size_t known = std::tuple_size_v<can::Messages>, pulses = known - 3;
+  static constexpr std::size_t messages = Cells > 24 ? known : pulses;
+  static_assert(std::is_same_v<std::tuple_element_t<pulses, can::Messages>, can::PulseCurrents>);
   std::array<SendState, messages> sent_{};
   StoredData stored_data_;
   estimator::EstimateHash hash_;

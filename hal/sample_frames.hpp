@@ -12,7 +12,9 @@
 //   0x31C           4 x i16 temperature_cdegc            of a pack
 //   0x31D           u48 time_us, i16 temperature_cdegc   completes the sample; of a pack: no temperature
 //   0x31E to 0x321  i32 uv, i32 uv                       of a pack of more than 16 cells: cells 17 and 18, ...
-//   0x322           as 0x31D, which is not sent          completes the sample of a pack of more than 16 cells
+//   0x322           as 0x31D, which is not sent          completes the sample of a pack of 17 to 24 cells
+//   0x323 to 0x326  i32 uv, i32 uv                       of a pack of more than 24 cells: cells 25 and 26, ...
+//   0x327           as 0x31D                             completes the sample of a pack of more than 24 cells
 //
 // A lost frame makes its readings missing. With a check frame, a sample with a wrong bit or a missing frame is
 // rejected as a whole.
@@ -35,19 +37,29 @@ namespace bms::hal {
 inline constexpr std::uint16_t start_frame_id = 0x310, check_frame_id = 0x311, reading_frame_id = 0x312,
                                dc_link_frame_id = 0x313, first_cells_frame_id = 0x314, temperatures_frame_id = 0x31C,
                                time_frame_id = 0x31D, cell_17_frame_id = 0x31E, large_pack_time_frame_id = 0x322,
-                               first_sample_frame_id = start_frame_id, last_sample_frame_id = large_pack_time_frame_id;
+                               cell_25_frame_id = 0x323, largest_pack_time_frame_id = 0x327,
+                               first_sample_frame_id = start_frame_id,
+                               last_sample_frame_id =
+                                   pack_cells > 24 ? largest_pack_time_frame_id : large_pack_time_frame_id;
 
 /// The last frame of a sample of this number of cells.
 template <std::size_t Cells>
-inline constexpr std::uint16_t completing_frame_id = Cells > 16 ? large_pack_time_frame_id : time_frame_id;
+inline constexpr std::uint16_t completing_frame_id = [] {
+  if (Cells > 24) return largest_pack_time_frame_id;
+  return Cells > 16 ? large_pack_time_frame_id : time_frame_id;
+}();
 
-/// Identifier of the frame with this cell and its neighbour; cell: 0 to 23.
+/// Identifier of the frame with this cell and its neighbour; cell: 0 to 31.
 constexpr std::uint16_t cells_frame_id(std::size_t cell) {
+  if (cell >= 24) return static_cast<std::uint16_t>(cell_25_frame_id + cell / 2 - 12);
   return static_cast<std::uint16_t>(cell < 16 ? first_cells_frame_id + cell / 2 : cell_17_frame_id + cell / 2 - 8);
 }
 
-/// The first of the two cells of a frame of a sample, or nothing if it has no cells.
+/// The first of the two cells of a frame of a sample of this number of cells, or nothing if it has no cells.
+template <std::size_t Cells>
 constexpr std::optional<std::size_t> first_cell_of(std::uint32_t id) {
+  if (Cells > 24 && id >= cell_25_frame_id && id < largest_pack_time_frame_id)
+    return 24 + std::size_t{2} * (id - cell_25_frame_id);
   if (id >= first_cells_frame_id && id < temperatures_frame_id) return std::size_t{2} * (id - first_cells_frame_id);
   if (id >= cell_17_frame_id && id < large_pack_time_frame_id) return 16 + std::size_t{2} * (id - cell_17_frame_id);
   return std::nullopt;
@@ -91,7 +103,7 @@ template <std::size_t Cells>
 constexpr std::array<can::Frame, pack_frames<Cells>> frames_of(const measurement::PackSample<Cells>& s,
                                                                std::int32_t link_plus_uv, std::uint16_t counter,
                                                                std::int32_t link_minus_uv = 0) {
-  static_assert(Cells <= 24);
+  static_assert(Cells <= 32);
   std::array<can::Frame, pack_frames<Cells>> frames{};
   std::size_t n = 1;
   const auto pair = [&](std::uint16_t id, std::int32_t first, std::int32_t second) {
@@ -142,11 +154,13 @@ template <std::size_t Cells>
 class SampleFrames {
  public:
   /// Returns true if `frame` completed a valid sample, which sample() holds until the next call. Frames with another
-  /// length or identifier change nothing, and neither do those of a pack of another size (above or up to 16 cells).
+  /// length or identifier change nothing, and neither do those of a pack of another size (up to 16, 24 or 32 cells).
   constexpr bool receive(const can::Frame& frame) {
     if (const auto start = starting_point_of(frame)) start_ = start;
-    if (frame.length != 8 || !is_sample_frame(frame) || frame.id == start_frame_id) return false;
-    if (frame.id > completing_frame_id<Cells> || (Cells > 16 && frame.id == time_frame_id)) return false;
+    if (frame.length != 8 || frame.long_id || frame.id <= start_frame_id) return false;
+    if (frame.id > completing_frame_id<Cells> || (Cells > 16 && frame.id == time_frame_id) ||
+        (Cells > 24 && frame.id == large_pack_time_frame_id))
+      return false;
     if (done_) begin();
     if (frame.id == check_frame_id) {
       begin();
@@ -164,7 +178,7 @@ class SampleFrames {
     } else if (frame.id == dc_link_frame_id) {
       link_plus_uv_ = get_bytes<std::int32_t>(frame.data, 0);
       link_minus_uv_ = get_bytes<std::int32_t>(frame.data, 4);
-    } else if (const auto first = first_cell_of(frame.id)) {
+    } else if (const auto first = first_cell_of<Cells>(frame.id)) {
       if (*first < Cells) building_.cell_uv[*first] = get_bytes<std::int32_t>(frame.data, 0);
       if (*first + 1 < Cells) building_.cell_uv[*first + 1] = get_bytes<std::int32_t>(frame.data, 4);
     } else if (frame.id == temperatures_frame_id) {

@@ -1,4 +1,4 @@
-# STM32F405RG, Cortex-M4F, on the board of an 80 V truck with 17 to 24 cells: the controller and the truck's side of
+# STM32F405RG, Cortex-M4F, on the board of an 80 V truck with 17 to 32 cells: the controller and the truck's side of
 # stm32f405_forklift, and two stacked monitoring chips. tests/firmware runs the image on a model of it.
 set(BMS_SCALAR_DEFINITION "")
 set(BMS_DEFAULT_CELL table9)
@@ -6,7 +6,7 @@ set(BMS_LINKER_SCRIPT ${CMAKE_CURRENT_LIST_DIR}/../stm32f405_forklift/memory.ld)
 set(BMS_CHIP stm32f4)
 set(BMS_CELLS 24)  # another number: -DBMS_CELLS=N
 set(BMS_FEWEST_CELLS 17)
-set(BMS_MOST_CELLS 24)  # the messages end there; the chips measure 32
+set(BMS_MOST_CELLS 32)  # 16 at each chip
 set(BMS_SAMPLE_PERIOD_S 0.1)
 set(BMS_CURRENT_RANGE_A 2000)  # 200 mV at 0.1 mohm
 set(BMS_PRECHARGE_S 0.5)  # 50 ohm x 10 mF

@@ -134,9 +134,13 @@ constexpr bool decode(Bytes from, std::uint8_t layout, ChargeRecord& r) {
   return true;
 }
 
+#ifndef BMS_STORED_CELLS  // an image of up to 24 cells has no memory for more (cmake/firmware.cmake)
+#define BMS_STORED_CELLS 32
+#endif
+
 struct CellsRecord {
   static constexpr Kind kind{2, 1};
-  static constexpr std::size_t max_cells = 24;
+  static constexpr std::size_t max_cells = BMS_STORED_CELLS;
   struct Cell {
     std::int16_t soc = 0;     ///< minus the mean, in 1e-5: +-0.32
     std::uint16_t sigma = 0;  ///< in 1e-5

@@ -19,7 +19,7 @@
 
 namespace bms::hil {
 
-inline constexpr std::size_t max_cells = 24;
+inline constexpr std::size_t max_cells = 32;
 
 /// Standard deviations, between the cells and of the sensors' noise.
 struct PackSpread {

@@ -8,6 +8,7 @@
 //   protection    instructions of the protection
 //   accuracy      state of charge of simulated cells: the shift and a thousand hours
 //   budgets       flash, RAM and stack of the boards
+//   sizes         costs of a pack of 8 to 32 cells
 //   trials        state of charge on real recordings
 //   fixed         fixed point against double, and the microbit against the host
 //   identification  speed; coverage of the bands of the Hammerstein-Wiener model
@@ -44,6 +45,7 @@
 #include "tests/figures/soc_trials.hpp"
 #include "tests/firmware/board_budget.hpp"
 #include "tests/firmware/step_cost.hpp"
+#include "tests/firmware/world/size_budgets.hpp"
 
 namespace bms {
 namespace {
@@ -435,6 +437,10 @@ void write_board() {
   files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table());
 }
 
+void write_sizes() {
+  files::replace_figures(source / "boards/stm32f405_80v/README.md", "sizes", world::size_budget_table());
+}
+
 /// State of charge on real recordings; unchanged if they are missing.
 void write_trials() {
   if (!std::filesystem::exists(data)) return;
@@ -462,6 +468,7 @@ void write_identification() {
 
 void run() {
   write_board();
+  write_sizes();
   write_front_page();
   write_accuracy();
   if (std::filesystem::exists(data)) {
@@ -483,6 +490,7 @@ const std::map<std::string_view, std::function<void()>> parts = {
     {"accuracy", write_accuracy},
     {"board", write_board},
     {"budgets", [] { files::replace_figures(source / "boards/README.md", "budgets", firmware::board_table()); }},
+    {"sizes", write_sizes},
     {"protection",
      [] { files::replace_figures(source / "firmware/protection/README.md", "netduinoplus2", protection_cost()); }},
     {"trials", write_trials},

@@ -1,4 +1,4 @@
-// The application with packs of 8, 15 and 24 cells, on this machine: the messages of its cells, and no others.
+// The application with packs of 8, 15, 24, 25 and 32 cells, on this machine: the messages of its cells, and no others.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -26,9 +26,14 @@ class PackSizes : public TelemetryTest {
     for (const can::Frame& f : sent) ids.insert(f.id);
     return ids;
   }
-  /// Identifiers from 0x190 to 0x193 and from 0x1AC to 0x1AE: cell voltages and the voltage of a large pack.
+  /// 0x190 to 0x193, 0x1AC to 0x1AE, 0x1BB and 0x1BC: cell voltages and the voltage of a large pack.
   static std::set<std::uint32_t> of_cells(std::set<std::uint32_t> ids) {
-    std::erase_if(ids, [](std::uint32_t id) { return id < 0x190 || (id > 0x193 && id < 0x1AC) || id > 0x1AE; });
+    const auto within = [](std::uint32_t id, std::uint32_t first, std::uint32_t last) {
+      return id >= first && id <= last;
+    };
+    std::erase_if(ids, [&](std::uint32_t id) {
+      return !within(id, 0x190, 0x193) && !within(id, 0x1AC, 0x1AE) && !within(id, 0x1BB, 0x1BC);
+    });
     return ids;
   }
 };
@@ -54,6 +59,28 @@ TEST_F(PackSizes, OfTwentyFourCellsSendsAllCellsAndAVoltageAbove65V) {
   EXPECT_NEAR(last<can::PackVoltage>()->voltage, 77.1, 0.0051);
   EXPECT_TRUE(std::isnan(last<can::PackElectrical>()->voltage)) << "its signal ends at 65.5 V";
   EXPECT_EQ(last<can::CellExtremes>()->highest_cell, 24U);
+}
+
+TEST_F(PackSizes, OfTwentyFiveCellsSendsTheLastInAMessageOfItsOwn) {
+  EXPECT_EQ(of_cells(send_sample<25>()),
+            (std::set<std::uint32_t>{0x190, 0x191, 0x192, 0x193, 0x1AC, 0x1AD, 0x1AE, 0x1BB}));
+  EXPECT_NEAR(last<can::CellVoltages7>()->cell25, 3.225, 1e-4);
+  EXPECT_TRUE(std::isnan(last<can::CellVoltages7>()->cell26));
+  EXPECT_EQ(last<can::CellExtremes>()->highest_cell, 25U);
+  EXPECT_EQ(last<can::CellExtremes>()->lowest_cell, 1U);
+}
+
+/// The signals of CellExtremes have no number for cells 31 and 32, but their voltages.
+TEST_F(PackSizes, OfThirtyTwoCellsSendsAllCells) {
+  EXPECT_EQ(of_cells(send_sample<32>()),
+            (std::set<std::uint32_t>{0x190, 0x191, 0x192, 0x193, 0x1AC, 0x1AD, 0x1AE, 0x1BB, 0x1BC}));
+  EXPECT_NEAR(last<can::CellVoltages8>()->cell29, 3.229, 1e-4);
+  EXPECT_NEAR(last<can::CellVoltages8>()->cell32, 3.232, 1e-4);
+  EXPECT_NEAR(last<can::PackVoltage>()->voltage, 102.928, 0.0051);
+  EXPECT_EQ(last<can::CellExtremes>()->highest_cell, can::CellExtremes::highest_cell_layout.invalid);
+  EXPECT_NEAR(last<can::CellExtremes>()->highest_voltage, 3.232, 1e-3);
+  EXPECT_NEAR(last<can::CellExtremes>()->lowest_voltage, 3.201, 1e-3);
+  EXPECT_EQ(last<can::CellExtremes>()->lowest_cell, 1U);
 }
 
 }  // namespace

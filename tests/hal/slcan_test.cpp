@@ -180,11 +180,15 @@ void expect_carried(const std::vector<std::uint32_t>& expected_ids) {
   EXPECT_EQ(received.sample().temperature_cdegc, pack_of<Cells>().temperature_cdegc);
 }
 
-TEST(SampleFrames, CarryPacksOf8And15And24CellsWithoutFramesOfAbsentCells) {
+TEST(SampleFrames, CarryPacksOfEachSizeWithoutFramesOfAbsentCells) {
   expect_carried<8>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x31C, 0x31D});
   expect_carried<15>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31D});
   expect_carried<24>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31E, 0x31F,
                       0x320, 0x321, 0x322});
+  expect_carried<25>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B, 0x31C, 0x31E, 0x31F,
+                      0x320, 0x321, 0x323, 0x327});
+  expect_carried<32>({0x311, 0x312, 0x313, 0x314, 0x315, 0x316, 0x317, 0x318, 0x319, 0x31A, 0x31B,
+                      0x31C, 0x31E, 0x31F, 0x320, 0x321, 0x323, 0x324, 0x325, 0x326, 0x327});
 }
 
 TEST(SampleFrames, OfASmallPackCompleteNoSampleOfALargeOneNorTheOtherWayRound) {
@@ -195,6 +199,11 @@ TEST(SampleFrames, OfASmallPackCompleteNoSampleOfALargeOneNorTheOtherWayRound) {
   for (const can::Frame& frame : frames_of(pack_of<16>(), 0, 2)) small.receive(frame);
   EXPECT_EQ(small.sample().cell_uv, pack_of<16>().cell_uv);
   EXPECT_EQ(small.rejected(), 0U);
+  SampleFrames<32> largest;
+  for (const can::Frame& frame : frames_of(pack_of<24>(), 0, 1)) EXPECT_FALSE(largest.receive(frame));
+  for (const can::Frame& frame : frames_of(pack_of<32>(), 0, 1)) large.receive(frame);
+  for (const can::Frame& frame : frames_of(pack_of<24>(), 0, 2)) large.receive(frame);
+  EXPECT_EQ(large.sample().cell_uv, pack_of<24>().cell_uv);
 }
 
 TEST(SampleFrames, ACheckedSampleWithAFlippedBitOrALostFrameIsRejected) {

@@ -64,6 +64,7 @@ void StackedBoard::pass(std::size_t which, double core_us) {
 }
 
 void StackedBoard::advance(std::uint64_t us) {
+  if (follow) follow();
   time_us += us;
   for (const std::size_t which : {lower, upper}) {
     chip[which].advance(0, circuit(which));
@@ -85,6 +86,10 @@ hal::I2cResult StackedBoard::transfer(std::size_t bus, std::uint8_t address, std
   if (which == upper && !isolator_supplied) {
     advance(25);
     return hal::I2cResult::no_acknowledge;
+  }
+  if (follow) {
+    follow();
+    for (const std::size_t of : {lower, upper}) chip[of].advance(0, circuit(of));
   }
   const std::uint64_t before_us = chip[which].time_us;
   const hal::I2cResult result = chip[which].transfer(address, out, in);

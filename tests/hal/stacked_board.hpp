@@ -6,6 +6,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 
 #include "hal/bq76952/configuration.hpp"
@@ -29,6 +30,10 @@ class StackedBoard {
   std::array<double, 4> temperature_c{25, 26, 27, 28};  ///< two at the lower chip, two at the upper one
 
   std::array<double, 2> die_c{25, 25};
+
+  /// Sets the values above to those at time_us. Called before time passes and before each transfer, so that the circuit
+  /// also changes while a chip is read.
+  std::function<void()> follow;
 
   // faults; those of a chip itself are in chip[]
   bool isolator_supplied = true;             ///< false: its far side; wires high here, enable signals low

@@ -43,6 +43,19 @@ void CellString::sum_up() {
   for (const Cell& cell : cells_) emf_v_ += ocv_v(cell) + cell.v_rc_v - cell.r0_ohm * cell.bleeding_a;
 }
 
+double CellString::emf_v(std::size_t cells) const {
+  double sum_v = 0;
+  for (std::size_t k = 0; k < cells; ++k)
+    sum_v += ocv_v(cells_[k]) + cells_[k].v_rc_v - cells_[k].r0_ohm * cells_[k].bleeding_a;
+  return sum_v;
+}
+
+double CellString::resistance_ohm(std::size_t cells) const {
+  double sum_ohm = 0;
+  for (std::size_t k = 0; k < cells; ++k) sum_ohm += cells_[k].r0_ohm;
+  return sum_ohm;
+}
+
 bool CellString::advance(double current_a, double duration_s) {
   bool moved = false;
   for (Cell& cell : cells_) {

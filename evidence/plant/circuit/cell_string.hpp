@@ -28,6 +28,9 @@ class CellString {
   std::size_t size() const { return cells_.size(); }
   double emf_v() const { return emf_v_; }  ///< with the voltages of the RC branches and of bleeding
   double resistance_ohm() const { return r0_ohm_; }
+  /// The same of the lowest cells.
+  double emf_v(std::size_t cells) const;
+  double resistance_ohm(std::size_t cells) const;
   /// Returns true if the resistance has changed.
   bool advance(double current_a, double duration_s);
   void set_bleeding_ohm(std::size_t cell, double ohm) { cells_[cell].bleeding_s = 1 / ohm; }  ///< infinite: off

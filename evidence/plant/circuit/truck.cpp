@@ -81,6 +81,20 @@ void Truck::break_wire(Wire wire) {
   }
 }
 
+void Truck::set_string_leak_ohm(double ohm) {
+  parameters_.leaks.string_ohm = ohm;
+  circuit_.set_resistance_ohm(network_.string_leak, ohm);
+}
+
+double Truck::insulation_ohm() const {
+  const FrameLeaks& leaks = parameters_.leaks;
+  double siemens = 1 / leaks.string_ohm;
+  const bool joined =
+      contact_closed(Relay::main_plus) || contact_closed(Relay::main_minus) || contact_closed(Relay::precharge);
+  if (joined) siemens += 1 / leaks.plus_ohm + 1 / leaks.minus_ohm;
+  return 1 / siemens;
+}
+
 void Truck::set_precharge_ohm(double ohm) {
   parameters_.precharge.ohm = ohm;
   circuit_.set_resistance_ohm(contact(Relay::precharge), ohm);
@@ -136,9 +150,18 @@ double Truck::step_limit_s(double rest_s) const {
 }
 
 void Truck::update_cells(double duration_s) {
-  if (cells_.advance(circuit_.current_a(network_.string), duration_s)) {
-    circuit_.set_resistance_ohm(network_.string, cells_.resistance_ohm());
+  const bool moved = cells_.advance(circuit_.current_a(network_.string), duration_s);
+  if (network_.divided) {
+    const std::size_t below = network_.cells_below;
+    if (moved) {
+      circuit_.set_resistance_ohm(network_.string, cells_.resistance_ohm() - cells_.resistance_ohm(below));
+      circuit_.set_resistance_ohm(network_.string_below, cells_.resistance_ohm(below));
+    }
+    circuit_.set_emf_v(network_.string, cells_.emf_v() - cells_.emf_v(below));
+    circuit_.set_emf_v(network_.string_below, cells_.emf_v(below));
+    return;
   }
+  if (moved) circuit_.set_resistance_ohm(network_.string, cells_.resistance_ohm());
   circuit_.set_emf_v(network_.string, cells_.emf_v());
 }
 

@@ -91,6 +91,11 @@ class Truck {
   const Contactor& contactor(Relay relay) const { return contactors_[static_cast<std::size_t>(relay)]; }
   void break_wire(Wire wire);
   void set_precharge_ohm(double ohm);
+  /// Of a truck whose string has a leak.
+  void set_string_leak_ohm(double ohm);
+  /// Between the battery and the frame: all leaks in parallel. While a contact joins them, those of the truck count:
+  /// the capacitor of the DC link joins its poles for what a monitor measures.
+  double insulation_ohm() const;
   CellString& cells() { return cells_; }
 
   void advance(double duration_s);

@@ -6,13 +6,27 @@ namespace bms::plant {
 
 namespace {
 
-constexpr double diode_ohm = 1, pin_leakage_ohm = 1e12;
+constexpr double diode_ohm = 1, pin_leakage_ohm = 1e12, no_leak_ohm = 1e12;
 
 void build_battery(Circuit& circuit, TruckNetwork& n, const TruckParameters& p, const CellString& cells) {
   n.c16 = circuit.add_node();
   n.b_plus = circuit.add_node();
   n.b_minus = circuit.add_node();
-  n.string = circuit.add(Branch{.from = n.c16, .resistance_ohm = cells.resistance_ohm(), .emf_v = cells.emf_v()});
+  n.cells_below = p.leaks.cells_below;
+  n.divided = std::isfinite(p.leaks.string_ohm) && n.cells_below > 0 && n.cells_below < cells.size();
+  if (n.divided) {
+    const std::size_t below = n.cells_below, tap = circuit.add_node();
+    n.string = circuit.add(Branch{.from = n.c16,
+                                  .to = tap,
+                                  .resistance_ohm = cells.resistance_ohm() - cells.resistance_ohm(below),
+                                  .emf_v = cells.emf_v() - cells.emf_v(below)});
+    n.string_below =
+        circuit.add(Branch{.from = tap, .resistance_ohm = cells.resistance_ohm(below), .emf_v = cells.emf_v(below)});
+    n.tap = tap;
+  } else {
+    n.string = circuit.add(Branch{.from = n.c16, .resistance_ohm = cells.resistance_ohm(), .emf_v = cells.emf_v()});
+    n.tap = n.cells_below == 0 ? Circuit::ground : n.c16;
+  }
   n.fuse = circuit.add(Branch{.from = n.b_plus, .to = n.c16, .resistance_ohm = p.fuse_ohm});
   n.shunt = circuit.add(Branch{.from = Circuit::ground, .to = n.b_minus, .resistance_ohm = p.shunt_ohm});
 }
@@ -80,6 +94,19 @@ void build_divider(Circuit& circuit, TruckNetwork& n, const Divider& p, std::siz
   circuit.add(Diode{.to = pin, .forward_v = adc_clamp_v, .on_ohm = diode_ohm, .off_ohm = pin_leakage_ohm});
 }
 
+/// The frame: what leaks to it.
+void build_frame(Circuit& circuit, TruckNetwork& n, const FrameLeaks& p) {
+  n.leaks = p.any();
+  if (!n.leaks) return;
+  n.frame = circuit.add_node();
+  const auto leak = [&](std::size_t node, double ohm) {
+    return circuit.add(Branch{.from = node, .to = n.frame, .resistance_ohm = std::isfinite(ohm) ? ohm : no_leak_ohm});
+  };
+  n.string_leak = leak(n.tap, p.string_ohm);
+  leak(n.l_plus, p.plus_ohm);
+  leak(n.l_minus, p.minus_ohm);
+}
+
 }  // namespace
 
 TruckNetwork build_network(Circuit& circuit, const TruckParameters& parameters, const CellString& cells) {
@@ -91,6 +118,7 @@ TruckNetwork build_network(Circuit& circuit, const TruckParameters& parameters, 
   build_front_end(circuit, network, parameters.front_end);
   build_divider(circuit, network, parameters.plus_divider, 0);
   build_divider(circuit, network, parameters.minus_divider, 1);
+  build_frame(circuit, network, parameters.leaks);
   return network;
 }
 

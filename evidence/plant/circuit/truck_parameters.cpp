@@ -55,6 +55,10 @@ double share_of(std::size_t cells) { return static_cast<double>(cells) / 16; }
 
 }  // namespace
 
+bool FrameLeaks::any() const {
+  return std::isfinite(string_ohm) || std::isfinite(plus_ohm) || std::isfinite(minus_ohm);
+}
+
 TruckParameters typical_world(std::size_t cells) {
   TruckParameters world;
   world.cells.resize(cells);

@@ -63,6 +63,17 @@ struct PrechargeResistor {
   double ambient_c = 25;
 };
 
+/// To the frame of the truck, which is a node if a resistance is finite.
+struct FrameLeaks {
+  static constexpr double none = std::numeric_limits<double>::infinity();
+
+  double string_ohm = none;                  ///< from a tap of the string of cells
+  std::size_t cells_below = 0;               ///< the tap: this many cells are below it; all: the top of the string
+  double plus_ohm = none, minus_ohm = none;  ///< from L+ and from L-: converters and motors
+
+  bool any() const;
+};
+
 struct TruckParameters {
   std::vector<StringCell> cells = std::vector<StringCell>(16);
   MonotoneCurve ocv_v = table9_ocv_v();  ///< of each cell
@@ -77,6 +88,7 @@ struct TruckParameters {
   Divider plus_divider = {}, minus_divider = {};
   SupplyParameters supply = {};
   std::array<HallParameters, 2> hall = {};
+  FrameLeaks leaks = {};
   std::uint64_t seed = 1;  ///< of the times of the contactors
 };
 

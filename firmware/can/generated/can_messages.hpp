@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 00ed14f29fcdb4c4c68831edd26ba49bb96151c39aa34281633611da684b7ea3
+// SHA-256 of that file: 88538ece5198f6285508d4bb924ffac4fe6c080e052d2f50eaeaf5aebb358487
 #pragma once
 
 #include <array>
@@ -847,9 +847,9 @@ struct CellExtremes {
   static constexpr SignalLayout lowest_voltage_layout = {25, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
   float lowest_voltage = unknown;  ///< [V] Of the cells.
   static constexpr SignalLayout highest_cell_layout = {38, 5, false, 1.0F, 0.0F, 0.0F, 30.0F, true, 31};
-  std::uint32_t highest_cell = 0;  ///< Number of the cell with the highest voltage, from 1.
+  std::uint32_t highest_cell = 0;  ///< Number of the cell with the highest voltage, from 1. Cells 31 and 32 are not known here; CellVoltages8 has their voltages.
   static constexpr SignalLayout lowest_cell_layout = {43, 5, false, 1.0F, 0.0F, 0.0F, 30.0F, true, 31};
-  std::uint32_t lowest_cell = 0;  ///< Number of the cell with the lowest voltage, from 1.
+  std::uint32_t lowest_cell = 0;  ///< Number of the cell with the lowest voltage, from 1. Cells 31 and 32 are not known here; CellVoltages8 has their voltages.
   static constexpr SignalLayout soc_spread_layout = {48, 16, false, 0.002F, 0.0F, 0.0F, 125.0F, true, 65535};
   float soc_spread = unknown;  ///< [%] State of charge of the fullest cell minus that of the emptiest cell.
 
@@ -886,8 +886,8 @@ struct CellExtremes {
   static void each_in_words(See&& see) {
     see("HighestVoltage", "Of the cells.", std::span<const ValueName>());
     see("LowestVoltage", "Of the cells.", std::span<const ValueName>());
-    see("HighestCell", "Number of the cell with the highest voltage, from 1.", std::span<const ValueName>());
-    see("LowestCell", "Number of the cell with the lowest voltage, from 1.", std::span<const ValueName>());
+    see("HighestCell", "Number of the cell with the highest voltage, from 1. Cells 31 and 32 are not known here; CellVoltages8 has their voltages.", std::span<const ValueName>());
+    see("LowestCell", "Number of the cell with the lowest voltage, from 1. Cells 31 and 32 are not known here; CellVoltages8 has their voltages.", std::span<const ValueName>());
     see("SocSpread", "State of charge of the fullest cell minus that of the emptiest cell.", std::span<const ValueName>());
   }
 };
@@ -3233,7 +3233,107 @@ struct PulseCurrents {
   }
 };
 
+/// Cells 25 to 28, counted from the negative end. Sent by packs of more than 24 cells.
+struct CellVoltages7 {
+  static constexpr const char* name = "CellVoltages7";
+  static constexpr std::uint16_t id = 0x1bb;
+  static constexpr std::uint32_t cycle_us = 500000;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 443;
+  static constexpr SignalLayout cell25_layout = {12, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell25 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell26_layout = {25, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell26 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell27_layout = {38, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell27 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell28_layout = {51, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell28 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<cell25_layout>(out, cell25);
+    put<cell26_layout>(out, cell26);
+    put<cell27_layout>(out, cell27);
+    put<cell28_layout>(out, cell28);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr CellVoltages7 of(const can::Frame& frame) {
+    CellVoltages7 out;
+    out.cell25 = get<cell25_layout, decltype(out.cell25)>(frame);
+    out.cell26 = get<cell26_layout, decltype(out.cell26)>(frame);
+    out.cell27 = get<cell27_layout, decltype(out.cell27)>(frame);
+    out.cell28 = get<cell28_layout, decltype(out.cell28)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("Cell25", "V", cell25, cell25_layout);
+    see("Cell26", "V", cell26, cell26_layout);
+    see("Cell27", "V", cell27, cell27_layout);
+    see("Cell28", "V", cell28, cell28_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    see("Cell25", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell26", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell27", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell28", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+  }
+};
+
+/// Cells 29 to 32, counted from the negative end. Sent by packs of more than 28 cells.
+struct CellVoltages8 {
+  static constexpr const char* name = "CellVoltages8";
+  static constexpr std::uint16_t id = 0x1bc;
+  static constexpr std::uint32_t cycle_us = 500000;  ///< 0: not cyclic
+  static constexpr std::uint16_t data_id = 444;
+  static constexpr SignalLayout cell29_layout = {12, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell29 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell30_layout = {25, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell30 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell31_layout = {38, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell31 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+  static constexpr SignalLayout cell32_layout = {51, 13, false, 0.001F, 0.0F, 0.0F, 8.19F, true, 8191};
+  float cell32 = unknown;  ///< [V] Voltage of this cell. Not known if the pack has fewer cells.
+
+  constexpr can::Frame frame(std::uint8_t counter) const {
+    can::Frame out{id, 8, {}, false};
+    put<cell29_layout>(out, cell29);
+    put<cell30_layout>(out, cell30);
+    put<cell31_layout>(out, cell31);
+    put<cell32_layout>(out, cell32);
+    protect(out, data_id, counter);
+    return out;
+  }
+  static constexpr CellVoltages8 of(const can::Frame& frame) {
+    CellVoltages8 out;
+    out.cell29 = get<cell29_layout, decltype(out.cell29)>(frame);
+    out.cell30 = get<cell30_layout, decltype(out.cell30)>(frame);
+    out.cell31 = get<cell31_layout, decltype(out.cell31)>(frame);
+    out.cell32 = get<cell32_layout, decltype(out.cell32)>(frame);
+    return out;
+  }
+  /// Calls see(name, unit, value, layout) for each signal.
+  template <class See>
+  constexpr void each(See&& see) {
+    see("Cell29", "V", cell29, cell29_layout);
+    see("Cell30", "V", cell30, cell30_layout);
+    see("Cell31", "V", cell31, cell31_layout);
+    see("Cell32", "V", cell32, cell32_layout);
+  }
+  /// Calls see(name, comment, names of values) for each signal: texts for people.
+  template <class See>
+  static void each_in_words(See&& see) {
+    see("Cell29", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell30", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell31", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+    see("Cell32", "Voltage of this cell. Not known if the pack has fewer cells.", std::span<const ValueName>());
+  }
+};
+
 /// All messages.
-using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, TruckInputs, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent, PulseCurrents>;
+using Messages = std::tuple<PackState, PackElectrical, Status, Identity, LastFaultAddress, LastFaultCause, CurrentLimits, Health, SocAnchor, ModelDetail, SensorErrors, CellVoltages1, CellVoltages2, CellVoltages3, CellVoltages4, CellVoltages5, CellVoltages6, PackVoltage, CellExtremes, Temperatures, SampleCurrent, SampleVoltage, SampleTime, EstimateHash, StartingSoc, StartingSigma, Command, CommandAnswer, Faults, MoreFaults, ContactorState, Balancing, AllowedCurrent, Storage, FrontEnd, Board, TruckInputs, StoredFault, StoredFaultPack, StoredFaultCells, StoredUse, StoredThroughput, StoredExtremes, StoredCounts, CanErrors, Stop, ServiceChallenge, ServiceRequest, CommandAuthority, DriveRequest, RequestChallenge, StoredAction, StoredActionDetail, ParameterValue, PackCurrent, PulseCurrents, CellVoltages7, CellVoltages8>;
 
 }  // namespace bms::can

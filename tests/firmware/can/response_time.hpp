@@ -95,10 +95,11 @@ enum class Cells { measured_by_the_board, measured_by_another_node };
 enum class Profile { none, cia418, j1939 };
 
 /// Packs of more than 16 cells have more messages, and more frames of a sample.
-enum class Pack { of_16_cells, of_24_cells };
+enum class Pack { of_16_cells, of_24_cells, of_32_cells };
 inline bool sends(Pack pack, std::uint32_t id) {
-  const bool above_16 = id == can::CellVoltages5::id || id == can::CellVoltages6::id || id == can::PackVoltage::id;
-  return pack == Pack::of_24_cells || !above_16;
+  const bool above_16 = id == can::CellVoltages5::id || id == can::CellVoltages6::id || id == can::PackVoltage::id,
+             above_24 = id == can::CellVoltages7::id || id == can::CellVoltages8::id;
+  return pack == Pack::of_32_cells || (!above_24 && (pack == Pack::of_24_cells || !above_16));
 }
 template <std::size_t Cells>
 void add_frames_of_a_sample(double samples_per_second, std::vector<Message>& to) {
@@ -120,7 +121,9 @@ inline std::vector<Message> messages_on_the_bus(double samples_per_second, doubl
       },
       can::Messages{});
   std::erase_if(all, [&](const Message& m) { return !sends(pack, m.id); });
-  if (cells == Cells::measured_by_another_node && pack == Pack::of_24_cells)
+  if (cells == Cells::measured_by_another_node && pack == Pack::of_32_cells)
+    add_frames_of_a_sample<32>(samples_per_second, all);
+  else if (cells == Cells::measured_by_another_node && pack == Pack::of_24_cells)
     add_frames_of_a_sample<24>(samples_per_second, all);
   else if (cells == Cells::measured_by_another_node)
     add_frames_of_a_sample<16>(samples_per_second, all);

@@ -73,9 +73,9 @@ TEST_F(PersistenceTest, CellsAreWrittenEveryHalfHourIfOneHasMoved) {
   }
   cells.resize(15);
   EXPECT_EQ(written<CellsRecord>(40, [](int) {}).size(), 1U) << "another number of cells";
-  cells.assign(24, {1'000, 0});
+  cells.assign(32, {1'000, 0});
   EXPECT_EQ(written<CellsRecord>(40, [](int) {}).size(), 1U);
-  cells.assign(25, {2'000, 0});
+  cells.assign(33, {2'000, 0});
   EXPECT_EQ(written<CellsRecord>(40, [](int) {}), Minutes{}) << "more cells than a record can store";
 }
 

@@ -166,11 +166,15 @@ TEST(Records, AreDecodedAsEncodedAndOnlyFromTheirLength) {
   is_decoded_as_encoded(SettingsRecord{});
 }
 
-TEST(CellsRecord, OfMoreThan24CellsIsNotDecoded) {
-  Raw bytes(1 + 4 * 25, 1);
-  bytes[0] = 25;
+TEST(CellsRecord, OfMoreThan32CellsIsNotDecoded) {
+  Raw bytes(1 + 4 * 33, 1);
+  bytes[0] = 33;
   CellsRecord cells;
   EXPECT_FALSE(decode(bytes, CellsRecord::kind.layout, cells));
+  bytes.resize(1 + 4 * 32);
+  bytes[0] = 32;
+  EXPECT_TRUE(decode(bytes, CellsRecord::kind.layout, cells));
+  EXPECT_EQ(cells.cell[31].sigma, 0x0101);
 }
 
 TEST(ChargeRecord, OfTheOlderLayoutIsMigratedWithTheSigmaOfAMinute) {

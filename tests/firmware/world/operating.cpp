@@ -55,6 +55,14 @@ Pack pack_with_charger_bus(const std::string& vehicle_profile) {
                                  fmt::format("-DBMS_CHARGER_BIT_RATE={}", own_charger_bit_rate)}})};
 }
 
+Pack pack_with_insulation_monitor(std::size_t cells) {
+  const files::CellFile cell = scaled(truck_ah);
+  return {truck_ah, cell.parameters.limits.discharge_current_max_a, cells,
+          images::chosen_image(cells > 16 ? "stm32f405_80v" : "stm32f405_forklift", cell,
+                               {fmt::format("insulation-{}cells", cells),
+                                {"-DBMS_INSULATION=pwm", fmt::format("-DBMS_CELLS={}", cells)}})};
+}
+
 WorldSetup random_setup(const Pack& pack, std::uint64_t seed) {
   WorldSetup setup;
   setup.seed = static_cast<std::uint32_t>(seed);

@@ -16,6 +16,8 @@ struct Pack {
 };
 /// Builds the image of the forklift board, or of stm32f405_80v, for this pack, if it is not there yet.
 Pack pack_of(double capacity_ah, std::size_t cells = 16, const std::string& vehicle_profile = "none");
+/// The same with an insulation monitor at PA6.
+Pack pack_with_insulation_monitor(std::size_t cells);
 /// Cells of a small forklift, and the cell whose thresholds firmware/protection/README.md prints.
 inline constexpr double truck_ah = 100, printed_ah = 6;
 

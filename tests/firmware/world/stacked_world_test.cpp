@@ -3,14 +3,21 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <sstream>
+#include <string>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
+#include "files/text_file.hpp"
+#include "images/firmware_image.hpp"
 #include "plant/random.hpp"
 #include "tests/firmware/world/cases.hpp"
 #include "tests/firmware/world/promise.hpp"
 #include "tests/firmware/world/scenarios.hpp"
+#include "tests/firmware/world/size_budgets.hpp"
 
 namespace bms::world {
 namespace {
@@ -36,24 +43,68 @@ void expect_clean(const TruckWorld& world) {
   EXPECT_THAT(world.violations(), IsEmpty());
 }
 
-TEST(StackedWorld, DrivesChargesAndOpensForItsHighestCell) {
-  TruckWorld world(pack().image, typical_setup(pack()));
+void drive_charge_and_open(const Pack& pack) {
+  TruckWorld world(pack.image, typical_setup(pack));
   for (const Operating state : {Operating::drive, Operating::charge, Operating::recuperate}) {
-    ASSERT_EQ(bring_to(world, pack(), state), "");
+    ASSERT_EQ(bring_to(world, pack, state), "");
     EXPECT_EQ(fault_names(world.vehicle.faults_seen()), "none") << name_of(state);
     if (state == Operating::recuperate) break;
     EXPECT_GE(key_off(world), 0) << name_of(state);
   }
   expect_clean(world);
   EXPECT_LT(world.vehicle.longest_sample_ms(), 50) << "BMS_BUDGET_SAMPLE_MS of board.cmake";
-  RecordProperty("longest_sample_us", static_cast<int>(1e3 * world.vehicle.longest_sample_ms()));
+  std::printf("longest sample %.1f ms\n", world.vehicle.longest_sample_ms());
   const double begun_ms = world.now_ms();
-  world.hold_cell(23, 3.9);
+  world.hold_cell(pack.cells - 1, 3.9);
   EXPECT_GE(world.run_until([&] { return world.isolated(); }, 1e3 * (0.2 + chain_s + contactor_s)), 0);
   EXPECT_GT(world.opened_ms() - begun_ms, 200) << "the delay of the row";
   world.run_ms(300);
   EXPECT_EQ(world.vehicle.first_cause(), 3U) << "cell overvoltage severe";
 }
+
+TEST(StackedWorld, DrivesChargesAndOpensForItsHighestCell) { drive_charge_and_open(pack()); }
+
+/// 9 + 8, 13 + 12 and 16 + 16 cells.
+class StackedSize : public ::testing::TestWithParam<std::size_t> {};
+TEST_P(StackedSize, DrivesChargesAndOpensForItsHighestCell) { drive_charge_and_open(pack_of(truck_ah, GetParam())); }
+INSTANTIATE_TEST_SUITE_P(Cells, StackedSize, ::testing::Values(17, 25, 32));
+
+/// The columns of a row of the table in the board's README.
+std::array<double, budget_columns> committed_budget(std::size_t cells) {
+  const std::string text = files::read_file(BMS_SOURCE_DIR "/boards/stm32f405_80v/README.md"),
+                    row = fmt::format("| {} cells |", cells);
+  const auto table = text.find("<!-- figures: sizes -->"), at = text.find(row, table);
+  std::array<double, budget_columns> columns{};
+  if (table == std::string::npos || at == std::string::npos) return columns;
+  std::istringstream line(text.substr(at + row.size(), text.find('\n', at) - at - row.size()));
+  for (double& column : columns) {
+    char bar = 0;
+    line >> column >> bar;
+  }
+  return columns;
+}
+
+class SizeBudgets : public ::testing::TestWithParam<std::size_t> {};
+/// The budgets of board.cmake hold for every size.
+TEST_P(SizeBudgets, AreThoseOfTheReadme) {
+  const SizeBudget measured = size_budget_of(GetParam());
+  const auto now = columns_of(measured), committed = committed_budget(GetParam());
+  for (std::size_t k = 0; k < now.size(); ++k) {
+    std::printf("%.1f ", now[k]);
+    EXPECT_NEAR(now[k], committed[k], 0.05 * now[k] + 0.051)
+        << "column " << k + 1 << "; if the change is worth it: build/host/tests/write_figures sizes";
+  }
+  std::printf("\n");
+  const auto budget = [](const std::string& of) {
+    return std::stod(
+        images::board_setting(GetParam() > 16 ? "stm32f405_80v" : "stm32f405_forklift", "BMS_BUDGET_" + of));
+  };
+  EXPECT_LE(measured.flash, budget("FLASH"));
+  EXPECT_LE(measured.ram, budget("RAM"));
+  EXPECT_LE(measured.stack, budget("STACK"));
+  EXPECT_LE(measured.longest_sample_ms, budget("SAMPLE_MS"));
+}
+INSTANTIATE_TEST_SUITE_P(Cells, SizeBudgets, ::testing::ValuesIn(budget_sizes));
 
 /// Driving, lifting, recuperation and pauses with noise on all readings. BMS_WORLD_MINUTES: another duration than 20.
 TEST(StackedWorld, TwentyMinutesOfATruckHaveNoFault) {

@@ -45,6 +45,7 @@ plant::PinLevel at_driver(PinLevel level) {
 
 std::uint32_t WorldI2c::read(std::uint32_t offset, double now_us) {
   const std::uint32_t value = model_->read(offset, now_us);
+  bytes_ += offset == data ? 1 : 0;
   if (offset != 0x14 && offset != 0x18) {
     polls_ = 0;
     return value;
@@ -58,6 +59,7 @@ std::uint32_t WorldI2c::read(std::uint32_t offset, double now_us) {
 
 void WorldI2c::write(std::uint32_t offset, std::uint32_t value, double now_us) {
   polls_ = 0;
+  bytes_ += offset == data ? 1 : 0;
   model_->write(offset, value, now_us);
 }
 
@@ -122,6 +124,12 @@ void TruckWorld::fit_clock() {
 void TruckWorld::fit_charger_bus(std::uint32_t bits_per_second) {
   charger_bus.emplace(board, bits_per_second);
   charger_bus->falls = [this] { exti.pin_edge(port_of_b, charger_receive, false); };
+}
+
+void TruckWorld::fit_insulation_monitor() {
+  insulation.emplace();
+  pulse_timer_.emplace(board, port_a, *insulation);
+  board.plugged.insert({PulseTimer::base, &*pulse_timer_});
 }
 
 // ---- time ----
@@ -220,6 +228,10 @@ void TruckWorld::update_inputs(const plant::PinVoltages& v) {
 void TruckWorld::observe() {
   const plant::PinVoltages v = truck.pins();
   adc.vdda_v = v.vdda_v;
+  if (insulation) {
+    insulation->pass(now_s() - insulation_passed_s_, truck.insulation_ohm());
+    insulation_passed_s_ = now_s();
+  }
   // REG1 of the front end, the key and the plug each enable the regulator of the controller.
   update_supply(!chip.in_shutdown() || key_on || plugged ? v.vdda_v : 0);
   update_auxiliary(plus_auxiliary, v.pb14_v, v.vdda_v);
@@ -404,6 +416,7 @@ std::vector<std::string> TruckWorld::violations() const {
                            &port_b.violations, &port_c.violations, &rtc.violations}) {
     all.insert(all.end(), more->begin(), more->end());
   }
+  if (pulse_timer_) all.insert(all.end(), pulse_timer_->violations.begin(), pulse_timer_->violations.end());
   if (charger_bus) all.insert(all.end(), charger_bus->can.violations.begin(), charger_bus->can.violations.end());
   return all;
 }

@@ -23,6 +23,7 @@
 #include "tests/firmware/unicorn_board.hpp"
 #include "tests/firmware/world/adc_model.hpp"
 #include "tests/firmware/world/gpio_model.hpp"
+#include "tests/firmware/world/insulation_device.hpp"
 #include "tests/firmware/world/vehicle.hpp"
 #include "tests/hal/bq76952_model.hpp"
 
@@ -55,10 +56,15 @@ class WorldI2c : public firmware::UnicornBoard::Peripheral {
   void write(std::uint32_t offset, std::uint32_t value, double now_us) override;
   void chip_reset() override;
   std::vector<std::string> violations() const;
+  /// Of the bytes that were sent and received, at 400 kHz: nine bits each.
+  double wire_ms() const { return 22.5e-3 * static_cast<double>(bytes_); }
 
  private:
+  static constexpr std::uint32_t data = 0x10;
+
   firmware::UnicornBoard& board_;
   Bq76952Model& chip_;
+  std::uint64_t bytes_ = 0;
   std::optional<firmware::I2cControllerModel> model_;
   std::vector<std::string> earlier_;
   unsigned polls_ = 0;
@@ -96,6 +102,8 @@ class TruckWorld {
   void fit_clock();
   /// The charger has a bus of its own, at CAN2. Before the first step.
   void fit_charger_bus(std::uint32_t bits_per_second);
+  /// An insulation monitor at PA6, for an image that reads one. Before the first step.
+  void fit_insulation_monitor();
   /// No other node is on the bus, so nothing is acknowledged; the truck's controller is off.
   void silence_bus(bool silent) {
     vehicle.talks = !silent;
@@ -128,6 +136,8 @@ class TruckWorld {
   /// Violations of the chip's manuals by the firmware.
   std::vector<std::string> violations() const;
 
+  /// Time of the bytes on the buses of the front ends since the start.
+  double i2c_ms() const { return i2c_.wire_ms() + upper_i2c_.wire_ms(); }
   /// More than 16 cells: the board stm32f405_80v, with a second chip.
   bool stacked() const { return truck.cell_count() > 16; }
 
@@ -140,6 +150,7 @@ class TruckWorld {
   AdcModel adc;
   firmware::RtcModel rtc;
   std::optional<firmware::SecondCan> charger_bus;
+  std::optional<InsulationDevice> insulation;
   Vehicle vehicle;
   SensorFaults sensors;
   std::function<void()> each_step;
@@ -161,6 +172,8 @@ class TruckWorld {
 
   WorldSetup setup_;
   WorldI2c i2c_, upper_i2c_;
+  std::optional<PulseTimer> pulse_timer_;
+  double insulation_passed_s_ = 0;
   plant::Random noise_;
   double truck_start_s_ = 0, fine_until_ms_ = 0, fine_step_ms_ = 1, switching_until_ms_ = 0, opened_ms_ = -1;
   double released_ms_ = never, late_ms_ = 0, late_edge_ms_ = 0;

@@ -135,6 +135,7 @@ void Vehicle::read(const can::Frame& frame, double at_ms) {
       break;
     case inputs_id:
       coils_dead_seen_ = coils_dead_seen_ || field(frame, 22, 2) == 0;
+      insulation_kohm_ = field(frame, 32, 16) == 65'535 ? -1 : 0.1 * static_cast<double>(field(frame, 32, 16));
       break;
     default:
       break;

@@ -34,6 +34,7 @@ class Vehicle {
   bool charge_enabled() const { return charge_enabled_; }
   double allowed_charge_a() const { return allowed_charge_a_; }
   double allowed_discharge_a() const { return allowed_discharge_a_; }
+  double insulation_kohm() const { return insulation_kohm_; }      ///< negative: not known
   double longest_sample_ms() const { return longest_sample_ms_; }  ///< Board.LongestSample; negative: not published
   double soc_percent() const { return soc_percent_; }
   double soc_sigma_percent() const { return soc_sigma_percent_; }
@@ -72,7 +73,7 @@ class Vehicle {
   unsigned first_cause_ = 0, state_ = 15;
   bool charge_enabled_ = false, coils_dead_seen_ = false;
   double allowed_charge_a_ = 0, allowed_discharge_a_ = 0, soc_percent_ = -1, soc_sigma_percent_ = 0,
-         longest_sample_ms_ = -1;
+         longest_sample_ms_ = -1, insulation_kohm_ = -1;
   std::vector<Change> changes_;
 };
 

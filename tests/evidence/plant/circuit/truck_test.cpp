@@ -214,5 +214,32 @@ TEST(Truck, IsTheSameForTheSameSeed) {
   EXPECT_EQ(run(), run());
 }
 
+/// One alone carries no current. With the truck's own the floating poles follow the tap.
+TEST(Truck, ALeakToTheFrameMovesThePolesThatFloat) {
+  constexpr double leak_ohm = 4e3, sound_ohm = 1e6;
+  TruckParameters world = typical_world(24);
+  const double without_v = at_rest_after(world, 0, {}).v.l_plus_v;
+  double before_v = -1;
+  for (const std::size_t below : {std::size_t{0}, std::size_t{12}, std::size_t{24}}) {
+    world.leaks = {.string_ohm = leak_ohm, .cells_below = below};
+    EXPECT_NEAR(at_rest_after(world, 0, {}).v.l_plus_v, without_v, 1e-3) << below << ": 1 Tohm stands for none";
+    world.leaks.plus_ohm = world.leaks.minus_ohm = sound_ohm;
+    const double v = at_rest_after(world, 0, {}).v.l_plus_v;
+    EXPECT_GT(v, before_v + (below > 0 ? 10 : 0)) << below;
+    before_v = v;
+    Truck truck(world);
+    truck.advance(0.1);
+    double cells_v = 0;
+    for (std::size_t k = 0; k < truck.cell_count(); ++k) cells_v += truck.cell_v(k);
+    EXPECT_NEAR(truck.voltages().b_plus_v, cells_v, 1e-3) << "the string is whole";
+    EXPECT_NEAR(truck.insulation_ohm(), leak_ohm, 1e-9);
+    weld(truck, {Relay::main_minus});
+    truck.advance(0.1);
+    EXPECT_NEAR(truck.insulation_ohm(), 1 / (1 / leak_ohm + 2 / sound_ohm), 1e-9) << "the truck's count, too";
+    truck.set_string_leak_ohm(sound_ohm);
+    EXPECT_NEAR(truck.insulation_ohm(), sound_ohm / 3, 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace bms::plant
