@@ -280,8 +280,9 @@ Diagnosis diagnose_together(Diagnosis d, const std::vector<MechanismSetting>& ow
 
   const Contributions contributed = contributions(likelihood, control, survivors.best);
   const auto healthy_gain = [&](std::size_t m) { return judge_healthy->gain_needed(m); };
-  d.findings = findings_of(search, survivors, contributed, judge_healthy ? HealthyGain(healthy_gain) : HealthyGain());
-  add_alike_at_one_current(search, likelihood, survivors.best, d.findings);
+  const HealthyGain of_healthy = judge_healthy ? HealthyGain(healthy_gain) : HealthyGain();
+  d.findings = findings_of(search, survivors, contributed, of_healthy);
+  add_alike_at_one_current(search, likelihood, survivors.best, of_healthy, d.findings);
   const Errors errors = errors_of(search, likelihood, options, d.healthy ? d.healthy->covered.share : 1);
   d.candidates = ranking_of(search, likelihood, control, grown, survivors, errors.file_v);
   d.verdict = verdict_of(adequacy, d, errors);

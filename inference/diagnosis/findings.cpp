@@ -14,9 +14,6 @@ namespace {
 constexpr const Thresholds::Decision& finding_limits = thresholds.decision;
 constexpr const Thresholds::Probability& probability_limits = thresholds.probability;
 
-/// Weight of a hypothesis this far behind another one, in -2 log posterior.
-double weight(double behind) { return std::exp(-behind / (2 * probability_limits.temper)); }
-
 /// A rival that cannot be distinguished from a finding.
 struct Equivalent {
   double behind;
@@ -33,8 +30,8 @@ std::size_t replacement_of(std::size_t m, const Hypothesis& rival, const Hypothe
   return other;
 }
 
-/// healthy_gain: below it the mechanism does not stand out from healthy recordings; 0 without them.
-Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, double healthy_gain) {
+/// times: model_error_times() of the mechanism.
+Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, double times) {
   const HypothesisFit& best = survivors.best;
   Finding f;
   f.setting = *best.hypothesis.find(m);
@@ -51,14 +48,13 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, do
                                                   ? std::span<const HypothesisFit>(rivals->second)
                                                   : std::span<const HypothesisFit>();
   for (const HypothesisFit& rival : fits) {
-    const double behind = search.score(rival) - search.score(best);
+    const double behind = (search.score(rival) - search.score(best)) / times;
     const std::size_t other = replacement_of(m, rival.hypothesis, best.hypothesis);
-    weights += weight(behind);
+    weights += weight_behind(behind);
     const auto alike = survivors.alike.find({m, other});
     const bool inseparable = alike != survivors.alike.end() && alike->second > finding_limits.inseparable;
-    double reach = inseparable ? finding_limits.tie_inseparable : finding_limits.tie;
-    if (alike != survivors.alike.end() && alike->second > finding_limits.trades) reach = std::max(reach, healthy_gain);
-    if (behind < reach) equivalents.push_back({behind, other, &rival});
+    if (behind < (inseparable ? finding_limits.tie_inseparable : finding_limits.tie))
+      equivalents.push_back({behind, other, &rival});
   }
   std::sort(equivalents.begin(), equivalents.end(), [](const Equivalent& a, const Equivalent& b) {
     return std::pair(a.behind, a.mechanism) < std::pair(b.behind, b.mechanism);
@@ -74,12 +70,17 @@ Finding finding_of(Search& search, const Survivors& survivors, std::size_t m, do
 
 }  // namespace
 
+double model_error_times(const HealthyGain& healthy_gain, std::size_t mechanism) {
+  return healthy_gain ? std::max(healthy_gain(mechanism).value_or(0) / finding_limits.detected, 1.0) : 1;
+}
+
+double weight_behind(double behind) { return std::exp(-behind / (2 * probability_limits.temper)); }
+
 std::vector<Finding> findings_of(Search& search, const Survivors& survivors, const Contributions& contributed,
                                  const HealthyGain& healthy_gain) {
   std::vector<Finding> findings;
   for (const std::size_t m : survivors.best.hypothesis.added()) {
-    Finding& f =
-        findings.emplace_back(finding_of(search, survivors, m, healthy_gain ? healthy_gain(m).value_or(0) : 0));
+    Finding& f = findings.emplace_back(finding_of(search, survivors, m, model_error_times(healthy_gain, m)));
     if (contributed.rms_v.contains(m)) f.rms_contribution_v = contributed.rms_v.at(m);
   }
   std::stable_sort(findings.begin(), findings.end(),
@@ -114,9 +115,9 @@ std::vector<Ranked> ranking_of(Search& search, const LikelihoodModel& likelihood
   std::stable_sort(ranking.begin(), ranking.end(), [](const Ranked& a, const Ranked& b) { return a.gain > b.gain; });
   const double no_mechanism = found ? -std::numeric_limits<double>::infinity() : finding_limits.detected;
   const double best_gain = ranking.empty() ? no_mechanism : std::max(ranking.front().gain, no_mechanism);
-  double total = weight(best_gain - no_mechanism);
-  for (const Ranked& r : ranking) total += weight(best_gain - r.gain);
-  for (Ranked& r : ranking) r.probability = probability_limits.at_most * weight(best_gain - r.gain) / total;
+  double total = weight_behind(best_gain - no_mechanism);
+  for (const Ranked& r : ranking) total += weight_behind(best_gain - r.gain);
+  for (Ranked& r : ranking) r.probability = probability_limits.at_most * weight_behind(best_gain - r.gain) / total;
   return ranking;
 }
 

@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <utility>
 
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
@@ -18,13 +21,14 @@ constexpr const Thresholds::Facts& current_limits = thresholds.facts;
 template <class... M>
 constexpr std::array<std::size_t, sizeof...(M)> indices = {model::mechanism_index_of<M>...};
 
-/// Each changes the charge that is counted, the drop of the voltage, or both.
-constexpr auto alike_at_one_current =
-    indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange,
-            model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation, model::TemperatureResistance,
-            model::ChargeTransfer>;
+/// What changes the counted charge, and what changes the drop of the voltage alone.
+constexpr auto of_charge =
+    indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange>;
+constexpr auto of_drop = indices<model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation,
+                                 model::TemperatureResistance, model::ChargeTransfer>;
 
-bool contains(const std::vector<std::size_t>& list, std::size_t m) {
+template <class List>
+bool contains(const List& list, std::size_t m) {
   return std::find(list.begin(), list.end(), m) != list.end();
 }
 
@@ -74,6 +78,42 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double large
   return static_cast<double>(near) >= current_limits.one_current_share * static_cast<double>(loaded_a.size());
 }
 
+/// others: may equal the finding. fits: with those of them that can be tested in its place, as the last mechanism;
+/// behind: of such a fit, as in weight_behind().
+void add_alike(Finding& f, std::vector<std::size_t> others, std::vector<HypothesisFit> fits,
+               const std::function<double(const HypothesisFit&)>& behind) {
+  struct Fitted {
+    std::size_t mechanism;
+    double behind;
+    bool as_good() const { return behind < thresholds.decision.tie_inseparable; }
+  };
+  std::vector<Fitted> fitted;
+  for (const HypothesisFit& fit : fits) fitted.push_back({fit.hypothesis.settings.back().index, behind(fit)});
+  const std::size_t m = f.setting.index;
+  const auto stands = [&](const auto& kind) {
+    return contains(kind, m) || std::any_of(fitted.begin(), fitted.end(), [&](const Fitted& other) {
+             return other.as_good() && contains(kind, other.mechanism);
+           });
+  };
+  const bool charge = stands(of_charge), drop = stands(of_drop);
+  double weights = thresholds.probability.at_most / f.probability;
+  for (std::size_t k = 0; k < fits.size(); ++k) {
+    const std::size_t other = fitted[k].mechanism;
+    std::erase(others, other);
+    if (!(contains(of_charge, other) ? charge : fitted[k].as_good())) continue;
+    weights += contains(of_charge, other) && contains(of_charge, m) ? 1 : weight_behind(fitted[k].behind);
+    f.equivalent_to.push_back(other);
+    f.rivals.push_back({std::move(fits[k].hypothesis), std::move(fits[k].covariance)});
+  }
+  // without a fit, as these recordings cannot test it: it does what others of its kind do
+  for (const std::size_t other : others) {
+    if (!(contains(of_charge, other) ? charge : drop)) continue;
+    weights += 1;
+    f.equivalent_to.push_back(other);
+  }
+  f.probability = thresholds.probability.at_most / weights;
+}
+
 }  // namespace
 
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
@@ -93,30 +133,26 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double capac
 }
 
 void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
-                              std::vector<Finding>& findings) {
+                              const HealthyGain& healthy_gain, std::vector<Finding>& findings) {
   if (!has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) return;
   const Hypothesis base = likelihood.base();
   std::vector<std::size_t> found;
   for (const Finding& f : findings) found.push_back(f.setting.index);
   for (Finding& f : findings) {
-    if (std::find(alike_at_one_current.begin(), alike_at_one_current.end(), f.setting.index) ==
-        alike_at_one_current.end())
-      continue;
-    std::vector<std::size_t> alike;
-    for (const std::size_t m : alike_at_one_current) {
-      if (!contains(found, m) && !contains(f.equivalent_to, m) && base.find(m) == nullptr &&
-          !reads_trusted(likelihood.facts().trusted_current, likelihood.facts().trusted_voltage, m))
-        alike.push_back(m);
-    }
-    f.probability /= static_cast<double>(1 + alike.size());  // none is more probable than another
-    for (HypothesisFit& fit : search.replaced(best, f.setting.index, alike)) {
-      const std::size_t m = fit.hypothesis.settings.back().index;
-      std::erase(alike, m);
-      f.equivalent_to.push_back(m);
-      f.rivals.push_back({std::move(fit.hypothesis), std::move(fit.covariance)});
-    }
-    // those that these recordings cannot test have no fit
-    f.equivalent_to.insert(f.equivalent_to.end(), alike.begin(), alike.end());
+    const std::size_t m = f.setting.index;
+    if (!contains(of_charge, m) && !contains(of_drop, m)) continue;
+    std::vector<std::size_t> others;
+    const auto add = [&](const auto& kind) {
+      std::copy_if(kind.begin(), kind.end(), std::back_inserter(others), [&](std::size_t other) {
+        return !contains(found, other) && !contains(f.equivalent_to, other) && base.find(other) == nullptr &&
+               !reads_trusted(likelihood.facts().trusted_current, likelihood.facts().trusted_voltage, other);
+      });
+    };
+    add(of_charge);
+    add(of_drop);
+    add_alike(f, others, search.replaced(best, m, others), [&](const HypothesisFit& fit) {
+      return std::max(search.score(fit) - search.score(best), 0.0) / model_error_times(healthy_gain, m);
+    });
   }
 }
 

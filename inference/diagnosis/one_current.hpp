@@ -2,11 +2,13 @@
 //
 // At a single current I the voltage is OCV(z0 - I t / C) - I R(t). An error of the current's reading, whatever its law,
 // is a constant there: it acts as another capacity together with another resistance, and each of these follows the
-// other within the tolerance of the cell file. Which of them fits best depends on errors of the model alone.
+// other within the tolerance of the cell file. Which of them fits best depends on errors of the model alone. A
+// resistance alone does not: it moves no knee, so it equals only what fits as well.
 #pragma once
 
 #include <vector>
 
+#include "diagnosis/findings.hpp"
 #include "diagnosis/likelihood_model.hpp"
 #include "diagnosis/search.hpp"
 #include "diagnosis/verdict.hpp"
@@ -24,8 +26,8 @@ inline constexpr double rest_at_one_current = 0.5;
 bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);
 
 /// Adds to each finding of `best` those causes that equal it if the recordings have one current, each fitted in its
-/// place.
+/// place. healthy_gain: as in findings_of().
 void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
-                              std::vector<Finding>& findings);
+                              const HealthyGain& healthy_gain, std::vector<Finding>& findings);
 
 }  // namespace bms::diagnosis

@@ -312,11 +312,11 @@ std::vector<HypothesisFit> Search::replaced(const HypothesisFit& best, std::size
   const HypothesisFit from =
       likelihood_.fit(without(best.hypothesis, mechanism), best.calibration, numerics.fit.reduced_iterations);
   const Screen screen(likelihood_, from, by);
-  likelihood_.linearise(from.hypothesis, from.calibration);
-  std::vector<HypothesisFit> fits(screen.candidates().size());
-  numerics::in_parallel(fits.size(), [&](std::size_t k) {
-    fits[k] = likelihood_.fit(with(from.hypothesis, screen.candidates()[k].start), from.calibration);
-  });
+  std::vector<HypothesisFit> fits =
+      fitted(from, screen.candidates(),
+             {std::numeric_limits<double>::infinity(), &best, mechanism,
+              likelihood_.residual(without(best.hypothesis, mechanism), best.calibration)});
+  learn_totals(fits);
   return fits;
 }
 

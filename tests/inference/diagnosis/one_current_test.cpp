@@ -66,7 +66,22 @@ TEST(OneCurrent, AnErrorOfTheCurrentIsNotNamedAsAnotherCauseAlone) {
     if (!names(d.verdict)) continue;
     const auto next = next_experiment(test::table9(), d, false);
     ASSERT_TRUE(next) << "an answer that leaves several causes must say what would decide";
-    EXPECT_GE(next->separates.size(), 4U) << next->profile;
+    EXPECT_GE(next->separates.size(), 3U) << next->profile;
+  }
+}
+
+TEST(OneCurrent, AResistanceIsNotNamedWithWhatMovesTheKnee) {
+  PreparedRecording r = test::recorded(discharge(-6, 2'600), 0.97, 6);
+  for (std::size_t k = 0; k < r.size(); ++k) r.voltage_v.edit()[k] += 0.05 * r.current_a[k];
+  const Diagnosis d = diagnose(test::table9(), {}, {r}, {});
+  ASSERT_FALSE(d.findings.empty()) << name_of(d.verdict);
+  const Finding& f = d.findings.front();
+  EXPECT_TRUE(f.setting.index == model::mechanism_index_of<model::ResistanceGrowth> ||
+              f.setting.index == model::mechanism_index_of<model::PolarisationGrowth>)
+      << model::catalogue[f.setting.index].id;
+  for (const std::size_t m : f.equivalent_to) {
+    EXPECT_NE(m, model::mechanism_index_of<model::CapacityChange>);
+    EXPECT_NE(m, model::mechanism_index_of<model::CurrentGain>);
   }
 }
 
