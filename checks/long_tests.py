@@ -32,7 +32,7 @@ def main():
     for number, line in enumerate(sources.read(root, LIST).splitlines(), 1):
         if line.startswith("#"):
             continue
-        row = re.fullmatch(r"(?:\w+/)?(\w+\.\w+)(/\d+)? (\d+) (\S.*)", line)
+        row = re.fullmatch(r"(?:\w+/)?(\w+\.\w+)(/\w+)? (\d+) (\S.*)", line)
         if not row:
             faults.append(f"{LIST}:{number}: expected NAME SECONDS REASON")
         elif row[1] not in tests:
