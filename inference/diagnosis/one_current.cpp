@@ -150,9 +150,9 @@ void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood,
     };
     add(of_charge);
     add(of_drop);
-    add_alike(f, others, search.replaced(best, m, others), [&](const HypothesisFit& fit) {
-      return std::max(search.score(fit) - search.score(best), 0.0) / model_error_times(healthy_gain, m);
-    });
+    const double times = model_error_times(healthy_gain, m);
+    add_alike(f, others, search.replaced(best, m, others),
+              [&](const HypothesisFit& fit) { return std::max(search.score(fit) - search.score(best), 0.0) / times; });
   }
 }
 

@@ -38,10 +38,7 @@ void CellString::linearise() {
   sum_up();
 }
 
-void CellString::sum_up() {
-  emf_v_ = 0;
-  for (const Cell& cell : cells_) emf_v_ += ocv_v(cell) + cell.v_rc_v - cell.r0_ohm * cell.bleeding_a;
-}
+void CellString::sum_up() { emf_v_ = emf_v(cells_.size()); }
 
 double CellString::emf_v(std::size_t cells) const {
   double sum_v = 0;
