@@ -10,6 +10,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cell_of_capacity.hpp"
 #include "tests/cells.hpp"
 #include "tests/starting_point.hpp"
 
@@ -18,21 +19,7 @@ namespace bms {
 inline constexpr double file_capacity_ah = 280, cells_in_parallel = file_capacity_ah / 6;
 
 /// table9 as a cell of 280 Ah.
-inline model::CellParameters<> cell_of_280_ah() {
-  model::CellParameters<> p = tests::table9;
-  p.capacity_ah = file_capacity_ah;
-  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
-    p.rc.r0_ohm[k] /= cells_in_parallel;
-    p.rc.r1_ohm[k] /= cells_in_parallel;
-    p.rc.c1_f[k] *= cells_in_parallel;
-  }
-  p.limits.charge_current_max_a *= cells_in_parallel;
-  p.limits.discharge_current_max_a *= cells_in_parallel;
-  for (double* a :
-       {&p.noise.current_a, &p.noise.current_offset_a, &p.noise.current_at_rest_a, &p.noise.current_unknown_a})
-    *a *= cells_in_parallel;
-  return p;
-}
+constexpr model::CellParameters<> cell_of_280_ah() { return tests::of_capacity(tests::table9, file_capacity_ah); }
 
 /// The truck, at 1 Hz. left: capacity over that of the file.
 class OpportunityCharging {

@@ -17,6 +17,7 @@
 #include "estimator/soc_estimator.hpp"
 #include "plant/random.hpp"
 #include "plant/truth_cell.hpp"
+#include "tests/cell_of_capacity.hpp"
 #include "tests/cells.hpp"
 #include "tests/hal/stacked_board.hpp"
 
@@ -25,21 +26,6 @@ namespace {
 
 constexpr double capacity_ah = 200, step_a = 280, noise_v = 0.001, cells_in_parallel = capacity_ah / 6;
 constexpr std::size_t cells = StackedBoard::cells, below = StackedBoard::cells_below;
-
-/// table9 with the capacity of a truck.
-model::CellParameters<> truck_cell() {
-  model::CellParameters<> p = tests::table9;
-  p.capacity_ah = capacity_ah;
-  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
-    p.rc.r0_ohm[k] /= cells_in_parallel;
-    p.rc.r1_ohm[k] /= cells_in_parallel;
-    p.rc.c1_f[k] *= cells_in_parallel;
-  }
-  for (double* amperes : {&p.limits.charge_current_max_a, &p.limits.discharge_current_max_a, &p.noise.current_a,
-                          &p.noise.current_offset_a, &p.noise.current_unknown_a})
-    *amperes *= cells_in_parallel;
-  return p;
-}
 
 /// Cells that are all alike, and a load that steps at random times.
 class Load {
@@ -74,7 +60,8 @@ class Load {
 
 /// The estimators of an image, and how they do.
 struct Judge {
-  model::Cell<float, model::max_intervals> cell = tests::prepared<float>(truck_cell());
+  model::Cell<float, model::max_intervals> cell =
+      tests::prepared<float>(tests::of_capacity(tests::table9, capacity_ah));
   estimator::SocEstimator<float> mean;
   estimator::PackCells<float, cells> each;
   double innovation2 = 0, error2 = 0, worst_sigmas = 0, soc = 0, sigma = 0, voltage_v = 0;

@@ -8,6 +8,7 @@
 #include "files/cell_file.hpp"
 #include "images/chosen_image.hpp"
 #include "images/firmware_image.hpp"
+#include "tests/cell_of_capacity.hpp"
 #include "tests/firmware/world/charges.hpp"
 
 namespace bms::world {
@@ -18,19 +19,7 @@ namespace {
 
 files::CellFile scaled(double capacity_ah) {
   files::CellFile cell = files::read_cell("table9");
-  const double factor = capacity_ah / cell.parameters.capacity_ah;
-  auto& p = cell.parameters;
-  p.capacity_ah = capacity_ah;
-  p.limits.charge_current_max_a *= factor;
-  p.limits.discharge_current_max_a *= factor;
-  for (std::size_t k = 0; k < p.rc.soc.size; ++k) {
-    p.rc.r0_ohm[k] /= factor;
-    p.rc.r1_ohm[k] /= factor;
-    p.rc.c1_f[k] *= factor;
-  }
-  p.noise.current_a *= factor;
-  p.noise.current_offset_a *= factor;
-  p.noise.current_unknown_a *= factor;
+  cell.parameters = tests::of_capacity(cell.parameters, capacity_ah);
   cell.name = fmt::format("table9_{:.0f}ah", capacity_ah);
   cell.source = fmt::format("table9 with the capacity of {:.0f} Ah", capacity_ah);
   return files::parse_cell(files::cell_text(cell), cell.name);
