@@ -76,7 +76,7 @@ TEST_P(LeakAt, IsReportedForbidsChargingAndEndsWithTheLeak) {
   EXPECT_THAT(world.closings_below_v(closing_limit_v), IsEmpty());
   EXPECT_THAT(world.violations(), IsEmpty());
 }
-INSTANTIATE_TEST_SUITE_P(Insulation, LeakAt, ::testing::Values(0, 12, 24));
+INSTANTIATE_TEST_SUITE_P(Insulation, LeakAt, ::testing::Values(0, 12, 24), ::testing::PrintToStringParamName());
 
 /// The signals that are no measurement. The row waits for 60 s.
 TEST(InsulationMonitor, ThatFailsIsUnknown) {

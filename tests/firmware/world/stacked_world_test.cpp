@@ -67,7 +67,7 @@ TEST(StackedWorld, DrivesChargesAndOpensForItsHighestCell) { drive_charge_and_op
 /// 9 + 8, 13 + 12 and 16 + 16 cells.
 class StackedSize : public ::testing::TestWithParam<std::size_t> {};
 TEST_P(StackedSize, DrivesChargesAndOpensForItsHighestCell) { drive_charge_and_open(pack_of(truck_ah, GetParam())); }
-INSTANTIATE_TEST_SUITE_P(Cells, StackedSize, ::testing::Values(17, 25, 32));
+INSTANTIATE_TEST_SUITE_P(Cells, StackedSize, ::testing::Values(17, 25, 32), ::testing::PrintToStringParamName());
 
 /// The columns of a row of the table in the board's README.
 std::array<double, budget_columns> committed_budget(std::size_t cells) {
@@ -104,7 +104,7 @@ TEST_P(SizeBudgets, AreThoseOfTheReadme) {
   EXPECT_LE(measured.stack, budget("STACK"));
   EXPECT_LE(measured.longest_sample_ms, budget("SAMPLE_MS"));
 }
-INSTANTIATE_TEST_SUITE_P(Cells, SizeBudgets, ::testing::ValuesIn(budget_sizes));
+INSTANTIATE_TEST_SUITE_P(Cells, SizeBudgets, ::testing::ValuesIn(budget_sizes), ::testing::PrintToStringParamName());
 
 /// Driving, lifting, recuperation and pauses with noise on all readings. BMS_WORLD_MINUTES: another duration than 20.
 TEST(StackedWorld, TwentyMinutesOfATruckHaveNoFault) {

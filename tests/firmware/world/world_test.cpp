@@ -95,7 +95,7 @@ TEST_P(PackSize, DrivesChargesAndOpensForItsHighestCell) {
   EXPECT_THAT(world.closings_below_v(closing_limit_v), IsEmpty());
   EXPECT_THAT(world.violations(), IsEmpty());
 }
-INSTANTIATE_TEST_SUITE_P(Cells, PackSize, ::testing::Values(8, 15));
+INSTANTIATE_TEST_SUITE_P(Cells, PackSize, ::testing::Values(8, 15), ::testing::PrintToStringParamName());
 
 /// The promise is read from the page as it is printed.
 TEST(Promise, ThePublishedTableHasTheRowsOfTheDbcFileInOrder) {
