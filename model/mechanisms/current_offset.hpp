@@ -11,7 +11,8 @@ struct CurrentOffset {
   static constexpr Domain domain = Domain::instrument;
   static constexpr bool on_board = true;
   static constexpr std::array parameters = {
-      Parameter{"offset_a", "A", Role::strength, 0, -0.3, 0.3, Per::ah, "b; bounds in multiples of 1C"},
+      Parameter{"offset_a", "A", Role::strength, 0, -0.3, 0.3, Per::ah, "b; bounds in multiples of 1C",
+                0.02},  // 1 % of a range of 2C
   };
 
   template <class S>
