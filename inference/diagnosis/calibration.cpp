@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include "diagnosis/charge_count.hpp"
 #include "diagnosis/numerics.hpp"
 #include "model/cell.hpp"
+#include "model/mechanisms/voltage_offset.hpp"
 
 namespace bms::diagnosis {
 
@@ -131,13 +134,33 @@ void Calibration::add_resistances(const model::CellParameters<>& cell, SocRange 
 
 void Calibration::add_record(const model::CellParameters<>& cell, const PreparedRecording& r) {
   initial_soc_.push_back(size_++);
-  initial_soc_sigma_.push_back(std::max(r.initial_soc_sigma, calibration_limits.initial_soc_at_least));
   const double every_s =
       std::max(cell.noise.current_offset_correlation_s, r.duration_s() / calibration_limits.offset_knots);
   std::vector<double> at;
   for (double s = r.time_s.front(); s < r.time_s.back() + every_s; s += every_s) at.push_back(s);
   if (at.size() < 2) at.push_back(at.front() + every_s);
   offset_.push_back(hat_functions(std::move(at), [&](double) { return offset_a_; }));
+}
+
+/// Two starts that are derived from the first voltage have the error of the OCV there in common, as far as they are
+/// less than a knot of it apart. What is left to each is the error of the voltmeter that read it.
+void Calibration::add_starts(const model::CellParameters<>& cell, std::span<const PreparedRecording> records) {
+  const auto sigma = [](const PreparedRecording& r) {
+    return std::max(r.initial_soc_sigma, calibration_limits.initial_soc_at_least);
+  };
+  const double of_voltmeter_v = model::VoltageOffset::parameters[0].usual, ocv_v = cell.tolerance.ocv_v,
+               in_common = std::max(0.0, 1 - std::pow(of_voltmeter_v / ocv_v, 2));
+  Eigen::MatrixXd covariance(at(records.size()), at(records.size()));
+  for (std::size_t j = 0; j < records.size(); ++j) {
+    for (std::size_t k = 0; k <= j; ++k) {
+      const PreparedRecording &a = records[j], &b = records[k];
+      const double apart = std::abs(a.initial_soc - b.initial_soc) / calibration_limits.ocv_knots_soc,
+                   derived = a.initial_soc_given || b.initial_soc_given ? 0 : std::max(0.0, 1 - apart),
+                   correlation = j == k ? 1 : in_common * derived;
+      covariance(at(j), at(k)) = covariance(at(k), at(j)) = correlation * sigma(a) * sigma(b);
+    }
+  }
+  start_ = covariance.llt().matrixL();
 }
 
 Calibration::Calibration(const model::CellParameters<>& cell, std::span<const PreparedRecording> records, bool branch,
@@ -156,6 +179,7 @@ Calibration::Calibration(const model::CellParameters<>& cell, std::span<const Pr
     add_record(cell, r);
     if (branch) branch_.push_back(size_++);
   }
+  add_starts(cell, records);
 }
 
 model::TablePoint<double> Calibration::change_at(double soc, const std::vector<double>& u, double r0_ohm,

@@ -14,8 +14,8 @@
 //   capacity    one unknown;  gain of the current sensor  one unknown
 //   share       R0's share in R0 + R1, where an identification knew both so badly that only their sum is known (rows
 //               too far apart): the sum stays
-//   per record  initial soc; the branch position of a hysteresis at the start; a slow wander of the current sensor's
-//               zero, over hours
+//   per record  initial soc, where those read from a first voltage share the OCV's error; the branch position of a
+//               hysteresis at the start; a slow wander of the current sensor's zero, over hours
 #pragma once
 
 #include <algorithm>
@@ -23,6 +23,8 @@
 #include <cstddef>
 #include <span>
 #include <vector>
+
+#include <Eigen/Core>
 
 #include "diagnosis/dual.hpp"
 #include "diagnosis/learned_error.hpp"
@@ -153,7 +155,13 @@ class Calibration {
     f(Lever::gain, gain_, thresholds.calibration.gain_sigma);
   }
   std::size_t ocv_unknowns() const { return ocv_.size() + corners_.size(); }
-  std::size_t initial_soc_unknown(std::size_t record) const { return initial_soc_[record]; }
+  /// f(unknown, change of the start per unit of the unknown), for all that move the start of a recording.
+  template <class F>
+  void each_start(std::size_t record, F&& f) const {
+    for (std::size_t k = 0; k <= record; ++k) {
+      if (const double size = start_(at(record), at(k)); size != 0) f(initial_soc_[k], size);
+    }
+  }
 
   /// Error of the current sensor's zero [A].
   template <class S>
@@ -162,7 +170,9 @@ class Calibration {
   }
   template <class S>
   S initial_soc_shift(std::size_t record, const std::vector<S>& u) const {
-    return u[initial_soc_[record]] * initial_soc_size(record);
+    S shift(0);
+    each_start(record, [&](std::size_t unknown, double size) { shift += u[unknown] * size; });
+    return shift;
   }
   /// Of the branch position at the start of a recording.
   template <class S>
@@ -171,7 +181,6 @@ class Calibration {
   }
   /// Empty if no recording has a branch position of its own.
   const std::vector<std::size_t>& branch_unknowns() const { return branch_; }
-  double initial_soc_size(std::size_t record) const { return initial_soc_sigma_[record]; }
   template <class S>
   S capacity_loss(const std::vector<S>& u) const {
     return u[capacity_] * thresholds.calibration.capacity_sigma;
@@ -211,6 +220,8 @@ class Calibration {
   void add_ocv(const model::CellParameters<>& cell, SocRange range, const LearnedError& learned);
   void add_resistances(const model::CellParameters<>& cell, SocRange range);
   void add_record(const model::CellParameters<>& cell, const PreparedRecording& r);
+  void add_starts(const model::CellParameters<>& cell, std::span<const PreparedRecording> records);
+  static Eigen::Index at(std::size_t record) { return static_cast<Eigen::Index>(record); }
   model::OcvTable<double> moved_ocv(const model::OcvTable<double>& ocv, const std::vector<double>& u) const;
   model::RcTable<double> moved_rc(const model::RcTable<double>& rc, const std::vector<double>& u) const;
   /// Change of the OCV, factors of R0, R1, C1. r0_ohm, r1_ohm: of the cell at this soc.
@@ -221,7 +232,7 @@ class Calibration {
   std::vector<Corner> corners_;
   std::vector<HatFunctions> offset_;  ///< by record
   std::vector<std::size_t> initial_soc_;
-  std::vector<double> initial_soc_sigma_;
+  Eigen::MatrixXd start_;  ///< factor of the starts' covariance, lower triangular: by record and initial_soc_
   std::vector<std::size_t> branch_;
   std::size_t capacity_ = 0, gain_ = 0, size_ = 0;
   double offset_a_ = 0;

@@ -75,10 +75,8 @@ class CarriedStates {
   CarriedStates(Eigen::Index states, Eigen::Index unknowns, Eigen::Index still)
       : still_(still), states_(Columns::Zero(states, unknowns - still)), next_(states_) {}
 
-  void restart(Eigen::Index initial_soc_unknown, double initial_soc_size) {
-    states_.setZero();
-    states_(0, initial_soc_unknown - still_) = initial_soc_size;
-  }
+  void restart() { states_.setZero(); }
+  void move_initial_soc(Eigen::Index unknown, double size) { states_(0, unknown - still_) = size; }
   /// start: derivatives of the initial states by an unknown.
   void set_start(Eigen::Index unknown, const Eigen::VectorXd& start) {
     states_.col(unknown - still_).head(start.size()) = start;
@@ -179,7 +177,10 @@ void LikelihoodModel::carry(const Hypothesis& h, const Eigen::VectorXd& u, Colum
   Eigen::Index row = 0, check_row = static_cast<Eigen::Index>(samples_);
   for (std::size_t r = 0; r < records_.size(); ++r) {
     const PreparedRecording& record = records_[r];
-    states.restart(static_cast<Eigen::Index>(calibration_.initial_soc_unknown(r)), calibration_.initial_soc_size(r));
+    states.restart();
+    calibration_.each_start(r, [&](std::size_t unknown, double size) {
+      states.move_initial_soc(static_cast<Eigen::Index>(unknown), size);
+    });
     if (!calibration_.branch_unknowns().empty()) {
       const SimulationSetup<Jet> setup = setup_for<Jet>(values, h, FromBranch<Jet>{{calibration_, unknowns}}, r);
       model::OpenLoopSimulation<Jet> simulation(tables_, cell_.capacity_ah, setup.laws, setup.initial_soc);

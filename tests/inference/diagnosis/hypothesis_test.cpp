@@ -1,5 +1,7 @@
 #include "diagnosis/likelihood_model.hpp"
 
+#include <map>
+
 #include <ceres/jet.h>
 #include <gmock/gmock.h>
 
@@ -111,6 +113,56 @@ TEST(Hypothesis, AFullCellBeginsOnItsChargeBranchAndLeavesItWithTheCharge) {
   }
   EXPECT_NEAR(branch_v(1, 0), 0, 1e-9);
   EXPECT_NEAR(branch_v(1, 100), -half_gap_v * decay * moved, 1e-4);
+}
+
+/// Covariance of two starts over the square of their standard deviation.
+double start_correlation(const Calibration& calibration, std::size_t a, std::size_t b, double sigma) {
+  std::map<std::size_t, double> of_a;
+  double sum = 0;
+  calibration.each_start(a, [&](std::size_t unknown, double size) { of_a[unknown] = size; });
+  calibration.each_start(b, [&](std::size_t unknown, double size) { sum += size * of_a[unknown]; });
+  return sum / (sigma * sigma);
+}
+
+/// A voltmeter is usually within 20 mV: of an OCV that is good to 40 mV three quarters of the variance are in common.
+TEST(Hypothesis, StartsThatAreReadFromOneVoltageAreWrongTogether) {
+  model::CellParameters<> cell = without_steps(test::table9());
+  constexpr double sigma = 0.02, in_common = 0.75;
+  cell.tolerance.ocv_v = 0.04;
+  std::vector<PreparedRecording> records;
+  for (const double soc : {0.97, 0.97, 0.95, 0.6, 0.97}) {
+    records.push_back(test::recorded(test::drive(0.1, 8), soc, 8));
+    records.back().initial_soc = soc;
+    records.back().initial_soc_sigma = sigma;
+    records.back().initial_soc_given = records.size() == 5;
+  }
+  const LikelihoodModel likelihood(cell, {}, records, NoiseModel{});
+  const Calibration& calibration = likelihood.calibration();
+  for (std::size_t r = 0; r < records.size(); ++r) EXPECT_NEAR(start_correlation(calibration, r, r, sigma), 1, 1e-9);
+  EXPECT_NEAR(start_correlation(calibration, 0, 1, sigma), in_common, 1e-9);
+  EXPECT_NEAR(start_correlation(calibration, 0, 2, sigma), 0.6 * in_common, 1e-9) << "0.4 knots of the OCV apart";
+  EXPECT_NEAR(start_correlation(calibration, 0, 3, sigma), 0, 1e-9) << "elsewhere the OCV has another error";
+  EXPECT_NEAR(start_correlation(calibration, 0, 4, sigma), 0, 1e-9) << "stated by a user";
+
+  const Hypothesis base = likelihood.base();
+  const Eigen::VectorXd u = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(calibration.size()), 0.2);
+  const Columns exact = likelihood.calibration_derivatives(base, u);
+  for (auto j = static_cast<Eigen::Index>(calibration.shared()); j < u.size(); ++j) {
+    Eigen::VectorXd more = u, less = u;
+    more[j] += 1e-5;
+    less[j] -= 1e-5;
+    const Eigen::VectorXd difference = (likelihood.residual(base, less) - likelihood.residual(base, more)) / 2e-5;
+    EXPECT_LT((difference - exact.col(j)).norm(), 0.01 * exact.col(j).norm() + 1e-4) << j;
+  }
+}
+
+TEST(Hypothesis, StartsOfAnOcvThatIsBetterThanAVoltmeterAreIndependent) {
+  model::CellParameters<> cell = test::table9();
+  cell.tolerance.ocv_v = 0.002;
+  std::vector<PreparedRecording> records(2, test::recorded(test::drive(0.1, 8), 0.97, 8));
+  for (PreparedRecording& r : records) r.initial_soc_given = false;
+  const LikelihoodModel likelihood(cell, {}, records, NoiseModel{});
+  EXPECT_EQ(start_correlation(likelihood.calibration(), 0, 1, 1), 0);
 }
 
 /// By every base parameter, as a dual number through the whole recording: slow but simple. One record, one mechanism.
