@@ -168,16 +168,14 @@ class SocMonitor {
         Variance(beyond * beyond) >
             arithmetic::product<Variance>(variance, Count(Consistency<S>::max_sigmas * Consistency<S>::max_sigmas));
     if ((consistency_.is_inconsistent(expected_v2, share_) || impossible) && !judged_by_bank()) {
-      estimate_again(cell, soc, variance, of_model_v2, state);
+      estimate_again(soc, variance, of_model_v2, state);
       return soc_ambiguous | soc_contradicted;
     }
     return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
   }
 
   /// Opens the bank around the present SOC, with a wider sigma.
-  template <class Cell>
-  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance, const Variance& of_model_v2,
-                                State& state) {
+  constexpr void estimate_again(const Soc& soc, const Variance& variance, const Variance& of_model_v2, State& state) {
     const Variance wider = arithmetic::product<Variance>(variance, Count(wider_sigma * wider_sigma));
     const auto least = Variance(least_sigma * least_sigma);
     const SocDistribution<S> before{soc, wider < least ? least : wider};
@@ -185,7 +183,7 @@ class SocMonitor {
     state.covariance.template reset<Model::soc>(before.variance);
     const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_error_factor)),
                    seen_v2 = consistency_.variance();
-    bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
+    bank_.open_at(soc, PriorMisfit<S>{before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
     consistency_.restart_scatter();
     seen_ = {};
