@@ -49,6 +49,8 @@ class AmbiguousSoc {
   static constexpr double replaces_above = 0.731;
   /// The bank watches until all SOCs this far away have a misfit of that much more: e^9 to 1.
   static constexpr double watches_beyond = 0.1, closes_above = 9;
+  /// How far outside of 0 to 1 a SOC can get by an error of the capacity alone.
+  static constexpr double capacity_may_be_off = 0.05;
 
   constexpr bool open() const { return bank_.open(); }
   /// The bank only watches: the filter goes on until its state is contradicted.
@@ -87,7 +89,8 @@ class AmbiguousSoc {
     const auto now = operating_point(input, state.model_state);
     if (bank_.begins_turn())
       read(cell, input, constants, look_up(now, soc, interval), deviation_v, drop_v2, seen, state);
-    const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
+    const auto observation = [&](const Soc& on_grid) -> typename SocBank<S>::Observation {
+      const Soc there = possible(on_grid);
       const auto tables = operating_point(reading_.input, reading_.model_state);
       const auto at = look_up(tables, there, interval);
       const auto polarised = Model::polarisation_at(reading_.model_state, reading_.at_1c_v,
@@ -198,6 +201,12 @@ class AmbiguousSoc {
   constexpr void close_if_decided(const Soc& soc, const Soc& filter_soc) {
     if (bank_.rules_out_beyond(Soc(watches_beyond), arithmetic::Current<S>(closes_above), soc, filter_soc))
       bank_.close();
+  }
+  /// A hypothesis that the counted charge has moved further than that has the voltages of that SOC.
+  static constexpr Soc possible(const Soc& soc) {
+    const auto least = Soc(-capacity_may_be_off), most = Soc(1 + capacity_may_be_off);
+    if (soc < least) return least;
+    return soc > most ? most : soc;
   }
   static constexpr Fraction uncorrelated() { return Fraction(uncorrelated_share); }
   static constexpr Fraction half_step() { return Fraction(0.5 / SocBank<S>::points); }

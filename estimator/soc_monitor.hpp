@@ -40,9 +40,6 @@ class SocMonitor {
   /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
   static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
 
-  /// How far outside of 0 to 1 a SOC can get by an error of the capacity alone.
-  static constexpr double capacity_may_be_off = 0.05;
-
   template <class Cell>
   constexpr void start(const Cell& cell) {
     reading_noise_v2_ = cell.noise.voltage_v2;
@@ -141,7 +138,7 @@ class SocMonitor {
 
   /// By how much a SOC is outside of what a cell can have; else <= 0.
   static constexpr Soc beyond_range(const Soc& soc) {
-    return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + capacity_may_be_off));
+    return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + AmbiguousSoc<S, ModelOf>::capacity_may_be_off));
   }
   constexpr bool is_suspect(const Soc& soc, const Voltage& innovation_v) const {
     return consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v) || beyond_range(soc) > Soc(0);
