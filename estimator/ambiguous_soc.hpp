@@ -4,10 +4,15 @@
 // Resistances depend on the SOC, in the cold by a factor of ten: a polarisation that was predicted at one SOC is scaled
 // to that of each hypothesis. Otherwise a wrong SOC near empty would explain itself by its own large resistance.
 // The error of a polarisation relaxes within its time constant, so it is noise; that of the other states is a bias.
+//
+// A turn of the bank takes 128 samples, and keeps the first one with the state of the filter at it. Were each
+// hypothesis compared on the sample of its turn, then one whose sample is wrong, because the load stepped between the
+// current and the voltage, would be ruled out by that: loads of 1.4 C that come and go made a start err by 9 sigma.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "estimator/cell_state.hpp"
 #include "estimator/persistent_errors.hpp"
@@ -44,6 +49,8 @@ class AmbiguousSoc {
   static constexpr double replaces_above = 0.731;
   /// The bank watches until all SOCs this far away have a misfit of that much more: e^9 to 1.
   static constexpr double watches_beyond = 0.1, closes_above = 9;
+  /// How far outside of 0 to 1 a SOC can get by an error of the capacity alone.
+  static constexpr double capacity_may_be_off = 0.05;
 
   constexpr bool open() const { return bank_.open(); }
   /// The bank only watches: the filter goes on until its state is contradicted.
@@ -76,39 +83,28 @@ class AmbiguousSoc {
       }
       bank_.open_at(soc, [](const Soc&) { return arithmetic::Exponent<S>(0); });
     }
-    const auto& laws = laws_of(cell);
-    const model::OperatingPoint operating_point{cell, input, Model::mechanism_states(state.model_state)};
-    const auto middle = look_up(operating_point, soc, interval);
-    const model::StepInput<S> reference{cell.noise.one_c_a, input.duration_s, input.temperature_c};
-    const auto final_v = [&](const auto& at) { return Model::final_voltages(laws, state.model_state, at, reference); };
-    const auto middle_v = final_v(middle);
-    const Voltage expected_v = Model::voltage(laws, state.model_state, middle, input);
-    const auto h = Model::measurement_jacobian(laws, middle, input);
-    const auto states_v2 = state.covariance.variances();
-    const Variance relaxing_v2 =
-        sum_variance<Model>(states_v2, h, [&](std::size_t k) { return Model::is_polarisation(laws, k); });
-    const Variance lasting_v2 = sum_variance<Model>(states_v2, h, [&](std::size_t k) {
-      return !Model::is_polarisation(laws, k) && !(Model::errors_are_states && k == Model::voltage_error);
-    });
-    const Variance new_v2 =
-        Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated()) +
-                 Variance(relaxing_v2 + seen.scatter_v2));
-    const Variance persistent_v2 =
-        Variance(Variance(Variance(cell.noise.model_v2 + lasting_v2) + Variance(drop_v2 + deviation_v2_)) +
-                 unidentified_v2(cell, laws, middle, middle_v, constants, seen));
-    const auto observation = [&](const Soc& there) -> typename SocBank<S>::Observation {
-      const auto at = look_up(operating_point, there, interval);
-      const auto polarised = Model::polarisation_at(state.model_state, middle_v, final_v(at));
-      const Voltage off_v = Voltage(deviation_v + (expected_v - Model::voltage(laws, polarised, at, input)));
-      const Variance axis_v2 = soc_axis_variance<S>(operating_point, cell.noise, at, there, off_v);
+    const auto operating_point = [&](const model::StepInput<S>& at_input, const ModelState& x) {
+      return model::OperatingPoint{cell, at_input, Model::mechanism_states(x)};
+    };
+    const auto now = operating_point(input, state.model_state);
+    if (bank_.begins_turn())
+      read(cell, input, constants, look_up(now, soc, interval), deviation_v, drop_v2, seen, state);
+    const auto observation = [&](const Soc& on_grid) -> typename SocBank<S>::Observation {
+      const Soc there = possible(on_grid);
+      const auto tables = operating_point(reading_.input, reading_.model_state);
+      const auto at = look_up(tables, there, interval);
+      const auto polarised = Model::polarisation_at(reading_.model_state, reading_.at_1c_v,
+                                                    at_1c_v(cell, reading_.input, reading_.model_state, at));
+      const Voltage off_v = Voltage(reading_.voltage_v - Model::voltage(laws_of(cell), polarised, at, reading_.input));
+      const Variance axis_v2 = soc_axis_variance<S>(tables, cell.noise, at, there, off_v);
       return {.off_v = off_v,
               .half_v = Voltage(ocv_slope<S>(at) * half_step()),
-              .new_v2 = new_v2,
+              .new_v2 = reading_.new_v2,
               .axis_v2 = arithmetic::product<Variance>(axis_v2, uncorrelated()),
-              .persistent_v2 = Variance(persistent_v2 + axis_v2)};
+              .persistent_v2 = Variance(reading_.persistent_v2 + axis_v2)};
     };
-    const auto result = bank_.step(soc, constants.bank_share(), cell.noise.voltage_v2,
-                                   Variance(cell.noise.model_v2 + lasting_v2), observation);
+    const auto result =
+        bank_.step(soc, constants.bank_share(), cell.noise.voltage_v2, reading_.lasting_v2, observation);
     if (!result.ready) return BankEvent::none;
     deviation_v2_ = Variance(
         deviation_v2_ - arithmetic::product<Variance>(deviation_v2_, SocBank<S>::decay_in(constants.bank_share())));
@@ -119,8 +115,10 @@ class AmbiguousSoc {
       return BankEvent::none;
     }
     state.charge.correct(result.moved, cell.charge);
-    const auto there = look_up(operating_point, moved, interval);
-    state.model_state = Model::polarisation_at(state.model_state, middle_v, final_v(there));
+    const auto at_1c = [&](const Soc& at_soc) {
+      return at_1c_v(cell, input, state.model_state, look_up(now, at_soc, interval));
+    };
+    state.model_state = Model::polarisation_at(state.model_state, at_1c(soc), at_1c(moved));
     state.covariance.template reset<Model::soc>(result.variance);
     in_background_ = result.variance < Variance(SocBank<S>::close_below_sigma * SocBank<S>::close_below_sigma);
     if (in_background_) close_if_decided(moved, moved);
@@ -136,16 +134,62 @@ class AmbiguousSoc {
   }
 
  private:
+  using ModelState = typename Model::State;
+  using Voltages = decltype(Model::final_voltages(std::declval<const model::LawSet<S>&>(), ModelState{}, {}, {}));
+
+  /// What the hypotheses of a turn are compared on: a sample, and the state of the filter then.
+  struct Reading {
+    model::StepInput<S> input{};
+    ModelState model_state{};
+    Voltages at_1c_v{};   ///< final voltages at 1C, at the SOC of the filter
+    Voltage voltage_v{};  ///< without the estimated voltage error
+    Variance new_v2{}, persistent_v2{}, lasting_v2{};
+  };
+
+  /// Final voltages at 1C.
+  template <class Cell>
+  static constexpr Voltages at_1c_v(const Cell& cell, const model::StepInput<S>& input, const ModelState& x,
+                                    const model::TablePoint<S>& at) {
+    return Model::final_voltages(laws_of(cell), x, at, {cell.noise.one_c_a, input.duration_s, input.temperature_c});
+  }
+
+  /// Takes a sample as the reading of a turn. middle: of the tables at the SOC of the filter.
+  template <class Cell, class Constants>
+  constexpr void read(const Cell& cell, const model::StepInput<S>& input, const Constants& constants,
+                      const model::TablePoint<S>& middle, const Voltage& deviation_v, const Variance& drop_v2,
+                      const SeenError<S>& seen, const State& state) {
+    const auto& laws = laws_of(cell);
+    const auto h = Model::measurement_jacobian(laws, middle, input);
+    const auto states_v2 = state.covariance.variances();
+    const Variance relaxing_v2 =
+        sum_variance<Model>(states_v2, h, [&](std::size_t k) { return Model::is_polarisation(laws, k); });
+    const Variance states_lasting_v2 = sum_variance<Model>(states_v2, h, [&](std::size_t k) {
+      return !Model::is_polarisation(laws, k) && !(Model::errors_are_states && k == Model::voltage_error);
+    });
+    const Variance lasting_v2 = Variance(cell.noise.model_v2 + states_lasting_v2);
+    const Voltages middle_v = at_1c_v(cell, input, state.model_state, middle);
+    reading_ = {
+        .input = input,
+        .model_state = state.model_state,
+        .at_1c_v = middle_v,
+        .voltage_v = Voltage(deviation_v + Model::voltage(laws, state.model_state, middle, input)),
+        .new_v2 = Variance(arithmetic::product<Variance>(Variance(cell.noise.model_v2 + drop_v2), uncorrelated()) +
+                           Variance(relaxing_v2 + seen.scatter_v2)),
+        .persistent_v2 = Variance(Variance(lasting_v2 + Variance(drop_v2 + deviation_v2_)) +
+                                  unidentified_v2(cell, middle, middle_v, constants, seen)),
+        .lasting_v2 = lasting_v2};
+  }
+
   /// Variance of a model that is used at another temperature than it was identified at: its scatter, and what the error
-  /// of the overpotential makes of a load before the half hour that was seen. at_1c_v: what 1C would leave.
-  template <class Cell, class Laws, class FinalVoltages, class Constants>
-  static constexpr Variance unidentified_v2(const Cell& cell, const Laws& laws, const model::TablePoint<S>& at,
-                                            const FinalVoltages& at_1c_v, const Constants& constants,
-                                            const SeenError<S>& seen) {
+  /// of the overpotential makes of a load before the half hour that was seen. left_v: what 1C would leave.
+  template <class Cell, class Constants>
+  static constexpr Variance unidentified_v2(const Cell& cell, const model::TablePoint<S>& at, const Voltages& left_v,
+                                            const Constants& constants, const SeenError<S>& seen) {
     if (!(constants.extrapolated_in_bank() > Fraction(0))) return Variance{};
-    Variance sum = Variance(Variance(Voltage(at.r0_ohm * cell.noise.one_c_a)) + Variance(at_1c_v[0]));
-    for (std::size_t k = 1; k < at_1c_v.size(); ++k) {
-      if (Model::is_polarisation(laws, Model::first_voltage + k - 1)) sum = Variance(sum + Variance(at_1c_v[k]));
+    Variance sum = Variance(Variance(Voltage(at.r0_ohm * cell.noise.one_c_a)) + Variance(left_v[0]));
+    for (std::size_t k = 1; k < left_v.size(); ++k) {
+      if (Model::is_polarisation(laws_of(cell), Model::first_voltage + k - 1))
+        sum = Variance(sum + Variance(left_v[k]));
     }
     const Variance left = Variance(
                        sum * arithmetic::ratio<Variance>(Variance(cell.noise.unknown_a), Variance(cell.noise.one_c_a))),
@@ -158,10 +202,17 @@ class AmbiguousSoc {
     if (bank_.rules_out_beyond(Soc(watches_beyond), arithmetic::Current<S>(closes_above), soc, filter_soc))
       bank_.close();
   }
+  /// A hypothesis that the counted charge has moved further than that has the voltages of that SOC.
+  static constexpr Soc possible(const Soc& soc) {
+    const auto least = Soc(-capacity_may_be_off), most = Soc(1 + capacity_may_be_off);
+    if (soc < least) return least;
+    return soc > most ? most : soc;
+  }
   static constexpr Fraction uncorrelated() { return Fraction(uncorrelated_share); }
   static constexpr Fraction half_step() { return Fraction(0.5 / SocBank<S>::points); }
 
   SocBank<S> bank_;
+  Reading reading_;
   Variance deviation_v2_{};
   bool in_background_ = false;
 };

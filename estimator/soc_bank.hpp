@@ -16,7 +16,8 @@
 //
 // One point is processed per sample: during `points` samples the misfits are updated, during the next `points` the
 // weights exp(-misfit) are summed; then mean and variance are computed. So every step costs the same. (The point-mass
-// filter of R. Bucy and K. Senne, Automatica 7 (1971) 287, on one state whose motion is known.)
+// filter of R. Bucy and K. Senne, Automatica 7 (1971) 287, on one state whose motion is known.) All points of a turn
+// are compared on one reading, the first: an error of that reading is then no difference between them.
 //
 // Memory: 8 bytes a point, one bank for an estimator.
 #pragma once
@@ -48,12 +49,15 @@ class SocBank {
 
   constexpr bool open() const { return open_; }
   constexpr void close() { open_ = false; }
+  /// The next step() begins a turn.
+  constexpr bool begins_turn() const { return turn_ == 0; }
 
-  /// Starts. mean: present SOC of the filter; misfit(soc): initial misfit, >= 0.
+  /// Starts. mean: present SOC of the filter; misfit(soc): initial misfit, >= 0. With the moments, so that `points`
+  /// samples pass before a reading: the error of the next one is that of the reading that the misfits are from.
   template <class F>
   constexpr void open_at(const Soc& mean, F&& misfit) {
     open_ = true;
-    turn_ = 0;
+    turn_ = points;
     mean_ = mean;
     bias_v_ = {};
     bias_share_ = Fraction(1);
@@ -64,6 +68,7 @@ class SocBank {
       misfit_[static_cast<std::size_t>(k)] = clamped(Misfit(misfit(grid(k))));
       if (misfit_[static_cast<std::size_t>(k)] < least_) least_ = misfit_[static_cast<std::size_t>(k)];
     }
+    next_least_ = least_;
   }
 
   /// Whether more than a whole capacity was counted since open_at(), so that no hypothesis is in its place any more.
@@ -88,17 +93,18 @@ class SocBank {
   /// One sample. soc: of the filter, the mean plus the charge counted since; share: correlation times that pass in
   /// 2 `points` samples, max_share at most; white_v2: variance of the reading; lasting_v2: part of p_k that is
   /// the same for all. Where it falls, because the branch of the hysteresis becomes known, the biases fall with it.
-  /// observation(soc_k): Observation.
+  /// observation(soc_k): Observation of the reading that began the turn, as are soc and lasting_v2.
   template <class F>
   constexpr BankUpdate step(const Soc& soc, const Fraction& share, const Variance& white_v2, const Variance& lasting_v2,
                             F&& observation) {
     if (turn_ == 0) {
       bias_left_ = lasting_v2 < lasting_v2_ ? arithmetic::ratio<Fraction>(lasting_v2, lasting_v2_) : Fraction(1);
       lasting_v2_ = lasting_v2;
+      moved_ = Soc(soc - mean_);
     }
     const auto k = static_cast<std::size_t>(turn_ % points);
     if (turn_ < points)
-      update_misfit(k, share, white_v2, observation(Soc(grid(static_cast<int>(k)) + (soc - mean_))));
+      update_misfit(k, share, white_v2, observation(Soc(grid(static_cast<int>(k)) + moved_)));
     else
       accumulate_moments(k);
     if (++turn_ < 2 * points) return {};
@@ -211,6 +217,7 @@ class SocBank {
   Misfit least_{}, next_least_{};
   Variance weights_{}, first_{}, second_{}, elsewhere_{};
   Soc mean_{};
+  Soc moved_{};  ///< by counted charge, when the turn began
   std::uint8_t turn_ = 0;
   bool open_ = false;
 };

@@ -326,9 +326,8 @@ class SocEstimator {
     report_state(cell, estimate);
     count_.begin(estimate.soc);
     errors_.start(estimate.soc);
-    const SocDistribution<S> soc{estimate.soc, anything};
     monitor_.start(cell);
-    monitor_.bank().open_at(soc.soc, StartMisfit<S, Cell>{cell, nullptr, &soc});
+    monitor_.bank().open_at(estimate.soc, PriorMisfit<S>{{estimate.soc, anything}});
     return estimate;
   }
 

@@ -40,9 +40,6 @@ class SocMonitor {
   /// Sigma of the SOC when it is estimated again: this many times as wide, and at least that wide.
   static constexpr double wider_sigma = 3, least_sigma = 2 * SocBank<S>::close_below_sigma;
 
-  /// How far outside of 0 to 1 a SOC can get by an error of the capacity alone.
-  static constexpr double capacity_may_be_off = 0.05;
-
   template <class Cell>
   constexpr void start(const Cell& cell) {
     reading_noise_v2_ = cell.noise.voltage_v2;
@@ -141,7 +138,7 @@ class SocMonitor {
 
   /// By how much a SOC is outside of what a cell can have; else <= 0.
   static constexpr Soc beyond_range(const Soc& soc) {
-    return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + capacity_may_be_off));
+    return Soc(arithmetic::magnitude(Soc(soc - Soc(0.5))) - Soc(0.5 + AmbiguousSoc<S, ModelOf>::capacity_may_be_off));
   }
   constexpr bool is_suspect(const Soc& soc, const Voltage& innovation_v) const {
     return consistency_.is_suspect() || OutlierGate<S>::is_suspect(innovation_v) || beyond_range(soc) > Soc(0);
@@ -168,16 +165,14 @@ class SocMonitor {
         Variance(beyond * beyond) >
             arithmetic::product<Variance>(variance, Count(Consistency<S>::max_sigmas * Consistency<S>::max_sigmas));
     if ((consistency_.is_inconsistent(expected_v2, share_) || impossible) && !judged_by_bank()) {
-      estimate_again(cell, soc, variance, of_model_v2, state);
+      estimate_again(soc, variance, of_model_v2, state);
       return soc_ambiguous | soc_contradicted;
     }
     return OutlierGate<S>::is_outlier(innovation_v, expected_v2) ? std::uint32_t{voltage_rejected} : 0;
   }
 
   /// Opens the bank around the present SOC, with a wider sigma.
-  template <class Cell>
-  constexpr void estimate_again(const Cell& cell, const Soc& soc, const Variance& variance, const Variance& of_model_v2,
-                                State& state) {
+  constexpr void estimate_again(const Soc& soc, const Variance& variance, const Variance& of_model_v2, State& state) {
     const Variance wider = arithmetic::product<Variance>(variance, Count(wider_sigma * wider_sigma));
     const auto least = Variance(least_sigma * least_sigma);
     const SocDistribution<S> before{soc, wider < least ? least : wider};
@@ -185,7 +180,7 @@ class SocMonitor {
     state.covariance.template reset<Model::soc>(before.variance);
     const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_error_factor)),
                    seen_v2 = consistency_.variance();
-    bank_.open_at(soc, StartMisfit<S, Cell>{cell, nullptr, &before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
+    bank_.open_at(soc, PriorMisfit<S>{before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
     consistency_.restart_scatter();
     seen_ = {};

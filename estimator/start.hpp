@@ -50,6 +50,22 @@ constexpr arithmetic::Exponent<S> wrong_prior_misfit(const arithmetic::Variance<
   return arithmetic::Exponent<S>(misfit > arithmetic::Current<S>(0) ? misfit : arithmetic::Current<S>(0));
 }
 
+/// Misfit of a SOC to a prior, >= 0, with the interface of StartMisfit.
+template <class S>
+struct PriorMisfit {
+  SocDistribution<S> before;  ///< with a standard deviation of two points' spacing or more
+  WrongPrior wrong = WrongPrior::one_in_a_hundred;
+
+  constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>&,
+                                               std::uint8_t&) const {
+    const arithmetic::Soc<S> off = soc - before.soc;
+    const auto of_prior = arithmetic::ratio<arithmetic::Exponent<S>>(
+        arithmetic::Variance<S>(off * off), arithmetic::Variance<S>(before.variance + before.variance));
+    const auto most = wrong_prior_misfit<S>(before.variance, wrong);
+    return of_prior < most ? of_prior : most;
+  }
+};
+
 template <class Cell>
 constexpr const auto& noise_of(const Cell& cell) {
   if constexpr (requires { cell.cell.noise; })
@@ -77,9 +93,8 @@ struct OcvReading {
 template <class S, class Cell, class Reading = OcvReading<S>>
 struct StartMisfit {
   const Cell& cell;
-  const Reading* reading;  ///< nullptr if it is missing
-  const SocDistribution<S>*
-      before;  ///< the prior, with a standard deviation of two points' spacing or more; nullptr if it is missing
+  const Reading* reading;            ///< nullptr if it is missing
+  const SocDistribution<S>* before;  ///< the prior, as in PriorMisfit; nullptr if it is missing
   WrongPrior wrong = WrongPrior::one_in_a_hundred;
 
   /// half_step: half the spacing of the points for which this is called.
@@ -99,10 +114,7 @@ struct StartMisfit {
       misfit = ratio<Exponent<S>>(Variance<S>(off_v * off_v), two_variances);
     }
     if (before == nullptr) return misfit;
-    const Soc<S> off = soc - before->soc;
-    const auto of_prior = ratio<Exponent<S>>(Variance<S>(off * off), Variance<S>(before->variance + before->variance));
-    const auto most = wrong_prior_misfit<S>(before->variance, wrong);
-    return Exponent<S>(misfit + (of_prior < most ? of_prior : most));
+    return Exponent<S>(misfit + PriorMisfit<S>{*before, wrong}(soc, half_step, interval));
   }
 };
 

@@ -21,7 +21,7 @@ struct Restart {
     constants.set_time_step(cell.noise, 1'000'000);
     constants.set_temperature(cell, 2'500);
     const SocDistribution<double> before{soc, 0.3 * 0.3};
-    ambiguous.open_at(soc, StartMisfit<double, decltype(cell)>{cell, nullptr, &before});
+    ambiguous.open_at(soc, PriorMisfit<double>{before});
   }
   /// One second at rest; the voltage is the OCV at true_soc.
   void second(double true_soc) {
@@ -58,7 +58,7 @@ TEST(AmbiguousSoc, StaysOpenOnThePlateau) {
 TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
   Restart r(0.5);
   const SocDistribution<double> before{0.5, 0.3 * 0.3};
-  r.ambiguous.open_at(0.5, StartMisfit<double, decltype(r.cell)>{r.cell, nullptr, &before}, false, 100);
+  r.ambiguous.open_at(0.5, PriorMisfit<double>{before}, false, 100);
   for (int k = 0; k < 1'800; ++k) r.second(0.05);
   EXPECT_TRUE(r.ambiguous.open());
   for (int k = 0; k < 4 * 3'600 && r.ambiguous.open(); ++k) r.second(0.05);
@@ -85,7 +85,7 @@ TEST(AmbiguousSoc, AStartThatNoVoltageContradictsStays) {
     for (const double sigma : {0.01, 0.02, 0.028}) {
       Restart r(soc);
       const SocDistribution<double> before{soc, sigma * sigma};
-      const StartMisfit<double, decltype(r.cell)> misfit{r.cell, nullptr, &before, WrongPrior::even_odds};
+      const PriorMisfit<double> misfit{before, WrongPrior::even_odds};
       r.ambiguous.open_at(soc, misfit, true, 100);  // the model was off by volts: no voltage says anything
       for (int k = 0; k < 300; ++k) r.second(soc);
       EXPECT_TRUE(r.ambiguous.in_background() || !r.ambiguous.open()) << soc << ", " << sigma;
