@@ -21,8 +21,7 @@
 // Both poles of the DC link are measured (dc_link.hpp). A main contactor may have an auxiliary contact.
 //
 //   self-test   all open. Precharge relay alone: L+ must become the pack, and a pole that it does not move is welded.
-//               Main- alone: L- must become 0, and a DC link that rises by an eighth of the pack shows that the plus
-//               pole is welded. Two samples in a row prove a weld.
+//               Main- alone: L- must become 0. Two samples in a row prove a weld.
 //   precharge   with `gap` = difference between pack and DC link, at first `gap_0`, and the time constant RC:
 //               full       gap <= 2 % of the pack; or after 3 RC, when the DC link moves by less than 0.5 % of the pack
 //                          in half an RC, because a load divides the voltage with the resistor. In both cases gap <=
@@ -112,7 +111,8 @@ class Contactors {
     if (!intact()) enter(ContactorState::safe);
     count(in_state_us_, in.step_us, plan_->longest_us());
     count(unchanged_us_, in.step_us, response_us);
-    held_.update(!outputs_.any_closed() && outputs_visible(), link);
+    const bool mains_open = outputs_visible() && !outputs_.main_plus && !outputs_.main_minus;
+    weld_test_.update(mains_open, outputs_.precharge, link);
     if (in.request != last_request_) last_request_ = Request::none;
     step(in, link);
     events_.not_closed = events_.not_closed || not_closed_;
@@ -146,8 +146,7 @@ class Contactors {
     state_.set(static_cast<std::uint32_t>(s) | test_part << part_shift);
     in_state_us_ = 0;
     proven_ = suspected_ = false;
-    if (test_part == 0) lowest_link_uv_ = measurement::no_reading;
-    if (test_part != 1) relay_test_.restart();
+    if (test_part == 0) weld_test_.restart();
     first_gap_uv_ = last_gap_uv_ = measurement::no_reading;
     last_half_ = 0;
     if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason does not restart the grace time
@@ -245,7 +244,8 @@ class Contactors {
 
   constexpr void in_self_test(const ContactorInput& in, const DcLink& link) {
     check_opened(in);
-    if (link.known()) check_part(link);
+    if (link.known() && outputs_visible())
+      proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     if (suspect_weld() || in_state_us_ < plan_->test_us) return;
     if (!proven_) return fail_precharge(link);
@@ -264,19 +264,6 @@ class Contactors {
     return events_.welded;
   }
 
-  /// Proves that the commanded contactor has closed, or that another one is closed. The voltages are known.
-  constexpr void check_part(const DcLink& link) {
-    const std::int32_t link_uv = link.link_uv();
-    if (part() == 2 && lowest_link_uv_ != measurement::no_reading && link_uv - lowest_link_uv_ > link.pack_uv / 8)
-      found_welded(Pole::plus);
-    if (!outputs_visible()) return;
-    proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
-    if (part() == 0) relay_test_.before(link);
-    if (part() != 1) return;
-    if (lowest_link_uv_ == measurement::no_reading || link_uv < lowest_link_uv_) lowest_link_uv_ = link_uv;
-    if (const Pole pole = relay_test_.after(link); pole != Pole::none) found_welded(pole);
-  }
-
   constexpr void fail_precharge(const DcLink& link) {
     if (outputs_.main_minus && link.known() && !link.minus_at_zero()) return fail_to_close();
     enter(ContactorState::opening);
@@ -285,7 +272,7 @@ class Contactors {
 
   constexpr void in_precharge(const ContactorInput& in, const DcLink& link) {
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
-    if (const Pole pole = closed_while_off(in); pole != Pole::none) found_welded(pole);
+    check_poles(in);
     if (suspect_weld()) return;
     const std::uint32_t half = in_state_us_ / plan_->half_time_constant_us;
     if (half >= ContactorPlan::max_half_time_constants) return fail_precharge(link);
@@ -359,32 +346,29 @@ class Contactors {
     if (!outputs_visible()) return Pole::none;
     if (in.auxiliary.fitted && in.auxiliary.main_plus_closed && !outputs_.main_plus) return Pole::plus;
     if (in.auxiliary.fitted && in.auxiliary.main_minus_closed && !outputs_.main_minus) return Pole::minus;
-    return held_.pole();
+    return weld_test_.pole();
   }
 
-  /// Checks for a weld while all contactors or one pole are open.
-  constexpr void check_opened(const ContactorInput& in) {
-    const bool flows = in.current_ua != measurement::no_reading && !rests(in);
+  constexpr void check_poles(const ContactorInput& in) {
     const Pole pole = closed_while_off(in);
-    if (pole != Pole::none || flows) found_welded(pole);
-  }
-  /// pole: none or unknown if the current shows it.
-  constexpr void found_welded(Pole pole) {
+    if (pole == Pole::none) return;
     events_.welded = true;
-    if (pole == Pole::plus || pole == Pole::minus)
-      welded_pole_ = pole;
-    else if (welded_pole_ == Pole::none)
-      welded_pole_ = Pole::unknown;
+    if (pole != Pole::unknown || welded_pole_ == Pole::none) welded_pole_ = pole;
+  }
+  /// Checks for a weld while all contactors or one pole are open. Which pole, a current does not show.
+  constexpr void check_opened(const ContactorInput& in) {
+    check_poles(in);
+    if (in.current_ua == measurement::no_reading || rests(in)) return;
+    events_.welded = true;
+    if (welded_pole_ == Pole::none) welded_pole_ = Pole::unknown;
   }
 
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
   std::uint32_t in_state_us_ = 0, overrun_us_ = 0;
-  std::uint32_t unchanged_us_ = 0;                         ///< since the outputs changed, up to response_us
-  std::int32_t lowest_link_uv_ = measurement::no_reading;  ///< with the relay closed, in this self-test
+  std::uint32_t unchanged_us_ = 0;  ///< since the outputs changed, up to response_us
   std::int32_t first_gap_uv_ = measurement::no_reading, last_gap_uv_ = measurement::no_reading;  ///< of this precharge
-  HeldPole held_;
-  RelayTest relay_test_;
+  WeldTest weld_test_;
   std::uint8_t last_half_ = 0;            ///< half time constant of last_gap_uv_
   Request last_request_ = Request::none;  ///< the request that was followed last; only a new request is followed again
   Pole welded_pole_ = Pole::none;

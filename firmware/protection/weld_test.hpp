@@ -14,7 +14,6 @@
 // does not discharge proves nothing while all are open; the next start does by its relay.
 #pragma once
 
-#include <algorithm>
 #include <cstdint>
 
 #include "measurement/sample.hpp"
@@ -22,80 +21,41 @@
 
 namespace bms::protection {
 
-/// While all are open.
-class HeldPole {
+class WeldTest {
  public:
-  /// all_open: all outputs are off, and the contactors at rest. A missing reading changes nothing but the answer.
-  constexpr void update(bool all_open, const DcLink& link) {
-    if (!all_open) at_ = Pole::none;
-    proven_ = all_open && link.known() && follow(link);
+  /// With every new state of the contactors, and with the self-test.
+  constexpr void restart() { held_ = 0; }
+  /// at_rest: main plus and main minus are off, and the contactors at rest. relay: the precharge relay is closed. A
+  /// missing reading changes nothing but the answer.
+  constexpr void update(bool at_rest, bool relay, const DcLink& link) {
+    proven_ = at_rest && link.known() ? unmoved(relay, link) : 0;
   }
-  /// Pole that is closed.
-  constexpr Pole pole() const { return proven_ ? at_ : Pole::none; }
-
- private:
-  constexpr bool follow(const DcLink& link) {
-    const Pole at = link.closed_pole();
-    const std::int32_t held_uv = at == Pole::minus ? link.minus_uv : link.pack_uv - link.plus_uv;
-    if (at != at_ || magnitude(held_uv - held_uv_) > link.least_move_uv()) {
-      at_ = at;
-      held_uv_ = held_uv;
-      link_uv_ = link.link_uv();
-      discharged_ = false;
-    }
-    if (at != Pole::plus && at != Pole::minus) return false;
-    discharged_ = discharged_ || magnitude(link.link_uv() - link_uv_) >= link.pack_uv / 2;
-    return discharged_;
-  }
-
-  std::int32_t held_uv_ = 0, link_uv_ = 0;  ///< when the pole was at its contact first
-  Pole at_ = Pole::none;
-  bool discharged_ = false, proven_ = false;
-};
-
-/// Around the closing of the precharge relay, in the first two parts of the self-test. The DC link is known() and the
-/// contactors are at rest.
-class RelayTest {
- public:
-  constexpr void restart() {
-    plus_ = minus_ = {};
-    at_zero_ = 0;
-    found_ = 0;
-  }
-  constexpr void before(const DcLink& link) {
-    plus_.add(link.pack_uv - link.plus_uv);
-    minus_.add(link.minus_uv);
-    if (link.minus_at_zero()) at_zero_ = 1;
-  }
-  /// Returns the pole that the relay has not moved. One sample is enough, and the next ones do not change it. A DC link
-  /// of less than 6 V shows that the relay has not closed.
-  constexpr Pole after(const DcLink& link) {
-    const std::int32_t move_uv = link.least_move_uv();
-    if (link.plus_at_pack() && plus_.has(link.pack_uv - link.plus_uv, move_uv)) found_ |= 1U;
-    if (at_zero_ != 0 && link.minus_at_zero() && minus_.has(link.minus_uv, move_uv) &&
-        link.link_uv() > DcLink::decidable_uv)
-      found_ |= 2U;
-    return static_cast<Pole>(found_);
-  }
+  /// Pole that is closed. Unknown: at least one.
+  constexpr Pole pole() const { return static_cast<Pole>(proven_); }
 
  private:
   static_assert(static_cast<int>(Pole::plus) == 1 && static_cast<int>(Pole::minus) == 2 &&
                 static_cast<int>(Pole::unknown) == 3);
+  static constexpr unsigned poles(bool plus, bool minus) { return (plus ? 1U : 0U) | (minus ? 2U : 0U); }
 
-  struct Range {
-    std::int32_t least_uv = DcLink::most_uv, most_uv = -DcLink::most_uv;
-
-    constexpr void add(std::int32_t uv) {
-      least_uv = std::min(least_uv, uv);
-      most_uv = std::max(most_uv, uv);
+  constexpr unsigned unmoved(bool relay, const DcLink& link) {
+    const std::int32_t gap_uv = link.pack_uv - link.plus_uv, gap_moved_uv = gap_uv - gap_uv_,
+                       minus_moved_uv = link.minus_uv - minus_uv_, least_uv = link.pack_uv >> 8;
+    const unsigned same = held_ & poles(magnitude(gap_moved_uv) <= least_uv, magnitude(minus_moved_uv) <= least_uv);
+    if (relay) {
+      // of an empty DC link L- is near 0 if the relay is open
+      return link.link_uv() > DcLink::decidable_uv ? same : same & 1U;
     }
-    constexpr bool has(std::int32_t uv, std::int32_t within_uv) const {
-      return uv >= least_uv - within_uv && uv <= most_uv + within_uv;
+    if (same == 0) {
+      gap_uv_ = gap_uv;
+      minus_uv_ = link.minus_uv;
+      held_ = poles(link.plus_at_pack(), link.minus_at_zero());
     }
-  };
+    return magnitude(gap_moved_uv + minus_moved_uv) >= link.pack_uv >> 1 ? same : 0;
+  }
 
-  Range plus_, minus_;  ///< B+ against L+; L-
-  std::uint32_t at_zero_ : 1 = 0, found_ : 2 = 0;
+  std::int32_t gap_uv_ = 0, minus_uv_ = 0;  ///< B+ against L+, and L-, when a pole was at its contact first
+  unsigned held_ = 0, proven_ = 0;          ///< poles: at their contacts then, closed
 };
 
 }  // namespace bms::protection

