@@ -13,7 +13,7 @@ namespace {
 using enum ContactorState;
 constexpr std::int32_t eighth_uv = rested_pack_uv / 8, sixteenth_uv = rested_pack_uv / 16;
 
-constexpr std::int32_t move_uv = rested_pack_uv / 256;
+constexpr std::int32_t least_move_uv = rested_pack_uv / 256;
 
 /// A pole that stays where it was, to 1/256 of the pack, when the precharge relay closes.
 TEST(WeldedContactor, IsAPoleThatThePrechargeRelayDoesNotMove) {
@@ -22,12 +22,12 @@ TEST(WeldedContactor, IsAPoleThatThePrechargeRelayDoesNotMove) {
     std::int32_t plus_before_uv, minus_before_uv, plus_uv, minus_uv;
     Pole pole;
   };
-  for (const Case& c : {Case{pack - 500'000, away, pack - 500'000 + move_uv, away, Pole::plus},
-                        {pack - 500'000, away, pack - 500'000 + move_uv + 1, away, Pole::none},
-                        {pack, away, pack - move_uv, away, Pole::plus},
-                        {pack, away, pack - move_uv - 1, away, Pole::none},
-                        {away, 500'000, pack, 500'000 + move_uv, Pole::minus},
-                        {away, 500'000, pack, 500'000 + move_uv + 1, Pole::none},
+  for (const Case& c : {Case{pack - 500'000, away, pack - 500'000 + least_move_uv, away, Pole::plus},
+                        {pack - 500'000, away, pack - 500'000 + least_move_uv + 1, away, Pole::none},
+                        {pack, away, pack - least_move_uv, away, Pole::plus},
+                        {pack, away, pack - least_move_uv - 1, away, Pole::none},
+                        {away, 500'000, pack, 500'000 + least_move_uv, Pole::minus},
+                        {away, 500'000, pack, 500'000 + least_move_uv + 1, Pole::none},
                         {away, 1'000'001, pack, 1'000'000, Pole::none},
                         {1'000'000, 0, 6'000'000, 0, Pole::none},
                         {1'000'000, 0, 6'000'001, 0, Pole::minus},
@@ -54,11 +54,11 @@ TEST(WeldedContactor, WhileAllAreOpenIsAPoleThatIsHeldOrAnyCurrentAboveRest) {
   constexpr std::int32_t pack = rested_pack_uv, half = pack / 2, none = measurement::no_reading;
   for (const Case& c : {Case{pack, 2'000'000, pack, 2'000'000 + half, Pole::plus},
                         {pack, 2'000'000, pack, 2'000'000 + half - 1, Pole::none},
-                        {pack, 2'000'000, pack - move_uv, 2'000'000 + half, Pole::plus},
-                        {pack, 2'000'000, pack - move_uv - 1, 2'000'000 + half, Pole::none},
+                        {pack, 2'000'000, pack - least_move_uv, 2'000'000 + half, Pole::plus},
+                        {pack, 2'000'000, pack - least_move_uv - 1, 2'000'000 + half, Pole::none},
                         {45'000'000, 0, 45'000'000 - half, 0, Pole::minus},
                         {45'000'000, 0, 45'000'000 - half + 1, 0, Pole::none},
-                        {45'000'000, 0, 45'000'000 - half, move_uv + 1, Pole::none},
+                        {45'000'000, 0, 45'000'000 - half, least_move_uv + 1, Pole::none},
                         {pack, 0, pack, 0, Pole::none},
                         {pack, none, pack, half, Pole::none},
                         {200'000'001, 0, pack, half, Pole::none},
