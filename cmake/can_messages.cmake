@@ -3,6 +3,7 @@
 #
 #   firmware/can/greybox_bms.dbc      firmware/can/generated/can_messages.hpp
 #   firmware/can/j1939_profile.dbc    firmware/can/generated/j1939_messages.hpp
+#   firmware/can/parallel_bus.dbc     firmware/can/generated/parallel_messages.hpp
 #
 # Link bms_can to include them.
 find_program(BMS_PYTHON python3 PATHS /usr/bin NO_DEFAULT_PATH)
@@ -22,7 +23,9 @@ endfunction()
 
 set(can_messages ${PROJECT_SOURCE_DIR}/firmware/can/generated/can_messages.hpp)
 set(j1939_messages ${PROJECT_SOURCE_DIR}/firmware/can/generated/j1939_messages.hpp)
+set(parallel_messages ${PROJECT_SOURCE_DIR}/firmware/can/generated/parallel_messages.hpp)
 bms_check_messages(${can_messages} ${PROJECT_SOURCE_DIR}/firmware/can/greybox_bms.dbc)
 bms_check_messages(${j1939_messages} ${PROJECT_SOURCE_DIR}/firmware/can/j1939_profile.dbc)
+bms_check_messages(${parallel_messages} ${PROJECT_SOURCE_DIR}/firmware/can/parallel_bus.dbc)
 add_library(bms_can INTERFACE)
 target_include_directories(bms_can INTERFACE ${BMS_INCLUDE_ROOTS} ${PROJECT_SOURCE_DIR}/firmware/can/generated)

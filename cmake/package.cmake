@@ -23,7 +23,8 @@ install(FILES ${completions}/bms.fish DESTINATION ${CMAKE_INSTALL_DATADIR}/fish/
 
 # data: cell files, CAN messages, the recording of the first example
 install(DIRECTORY model/cells DESTINATION ${data} COMPONENT tool FILES_MATCHING PATTERN *.toml PATTERN README.md)
-install(FILES firmware/can/greybox_bms.dbc firmware/can/j1939_profile.dbc DESTINATION ${data}/can COMPONENT tool)
+install(FILES firmware/can/greybox_bms.dbc firmware/can/j1939_profile.dbc firmware/can/parallel_bus.dbc
+  DESTINATION ${data}/can COMPONENT tool)
 install(FILES evidence/recordings/forklift_shift.csv DESTINATION ${data}/recordings COMPONENT tool)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT tool)
 install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} RENAME copyright COMPONENT tool)

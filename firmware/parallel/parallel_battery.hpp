@@ -51,8 +51,11 @@ struct Design {
 struct Decision {
   std::uint8_t leader = 0;  ///< 0: none
   bool leads = false;
-  bool may_close = false;  ///< precharge and close, or stay closed
-  bool must_open = false;  ///< in an orderly way, within a second
+  bool may_close = false;     ///< precharge and close, or stay closed
+  bool must_open = false;     ///< in an orderly way, within a second
+  bool leaderless = false;    ///< nothing has arrived from a leader for leave_us
+  std::size_t connected = 0;  ///< batteries, as far as they are present
+  std::int64_t total_ua = 0;  ///< their current: that of the truck or charger
   /// Of the whole group, for truck and charger; of a leader.
   std::int32_t group_discharge_ua = 0, group_charge_ua = 0;
 };
@@ -140,7 +143,8 @@ class ParallelBattery {
     own.granted = decision_.leads ? grant(request) : std::uint8_t{0};
     peers_[design_.node - 1U].last = own;
     decision_.may_close = may_close(own, request);
-    decision_.must_open = own.state == State::connected && (leaderless_us() > leave_us || request == Request::none);
+    decision_.leaderless = leaderless_us() > leave_us;
+    decision_.must_open = own.state == State::connected && (decision_.leaderless || request == Request::none);
     limit(step_us);
     return decision_;
   }
@@ -233,9 +237,11 @@ class ParallelBattery {
     std::array<GroupLimit::Use, most_batteries> discharge{}, charge{};
     std::size_t connected = 0;
     std::uint8_t which = 0;
+    decision_.total_ua = 0;
     for (std::size_t k = 0; k < design_.batteries; ++k) {
       const Presence& p = peers_[k].last;
       if (!present(k) || p.state != State::connected) continue;
+      decision_.total_ua += p.current_ua;
       discharge[connected] = {-std::int64_t{p.current_ua}, p.allowed_discharge_ua};
       charge[connected++] = {p.current_ua, p.allowed_charge_ua};
       which = static_cast<std::uint8_t>(which | 1U << k);
@@ -243,6 +249,7 @@ class ParallelBattery {
     discharge_.update(discharge, connected, which != connected_, step_us);
     charge_.update(charge, connected, which != connected_, step_us);
     connected_ = which;
+    decision_.connected = connected;
     decision_.group_discharge_ua = decision_.leads ? discharge_.limit_ua() : 0;
     decision_.group_charge_ua = decision_.leads ? charge_.limit_ua() : 0;
   }

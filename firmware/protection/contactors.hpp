@@ -20,9 +20,8 @@
 //
 // Both poles of the DC link are measured (dc_link.hpp). A main contactor may have an auxiliary contact.
 //
-//   self-test   all open: no pole may be closed. Precharge relay alone: L+ must become the pack. Main- alone: L- must
-//               become 0. In the second and third part a DC link that rises by an eighth of the pack shows that the
-//               other pole is welded. Two samples in a row prove a weld.
+//   self-test   all open. Precharge relay alone: L+ must become the pack, and a pole that it does not move is welded.
+//               Main- alone: L- must become 0. Two samples in a row prove a weld.
 //   precharge   with `gap` = difference between pack and DC link, at first `gap_0`, and the time constant RC:
 //               full       gap <= 2 % of the pack; or after 3 RC, when the DC link moves by less than 0.5 % of the pack
 //                          in half an RC, because a load divides the voltage with the resistor. In both cases gap <=
@@ -32,7 +31,7 @@
 //               too fast   gap < gap_0 / 8 within half an RC: a quarter of the time constant, the resistor is shorted.
 //                          Visible if the samples are closer than half an RC and gap_0 is more than an eighth of the
 //                          pack.
-//   welded      with all outputs off a pole is closed or current flows, or an auxiliary contact is closed
+//   welded      with all outputs off a pole is held (weld_test.hpp), current flows, or an auxiliary contact is closed
 //   not closed  with both outputs on a pole differs from the pack by a sixteenth of it, for 0.3 s (table). At once: by
 //               a quarter of it, by an auxiliary contact, or by its interrupt. Also main- that does not close.
 //
@@ -52,6 +51,7 @@
 #include "protection/contactor_plan.hpp"
 #include "protection/dc_link.hpp"
 #include "protection/guarded.hpp"
+#include "protection/weld_test.hpp"
 
 namespace bms::protection {
 
@@ -111,6 +111,8 @@ class Contactors {
     if (!intact()) enter(ContactorState::safe);
     count(in_state_us_, in.step_us, plan_->longest_us());
     count(unchanged_us_, in.step_us, response_us);
+    const bool mains_open = outputs_visible() && !outputs_.main_plus && !outputs_.main_minus;
+    weld_test_.update(mains_open, outputs_.precharge, link);
     if (in.request != last_request_) last_request_ = Request::none;
     step(in, link);
     events_.not_closed = events_.not_closed || not_closed_;
@@ -144,7 +146,7 @@ class Contactors {
     state_.set(static_cast<std::uint32_t>(s) | test_part << part_shift);
     in_state_us_ = 0;
     proven_ = suspected_ = false;
-    if (test_part == 0) lowest_link_uv_ = measurement::no_reading;
+    if (test_part == 0) weld_test_.restart();
     first_gap_uv_ = last_gap_uv_ = measurement::no_reading;
     last_half_ = 0;
     if (s != ContactorState::unloading) overrun_us_ = 0;  // a second reason does not restart the grace time
@@ -160,7 +162,7 @@ class Contactors {
     if (may_close && contact_opened(in, link)) return fail_to_close();
     switch (s) {
       case ContactorState::off:
-        return in_off(in, link);
+        return in_off(in);
       case ContactorState::self_test:
         return in_self_test(in, link);
       case ContactorState::precharge:
@@ -174,7 +176,7 @@ class Contactors {
       case ContactorState::opening:
         return in_opening(in, link);
       case ContactorState::safe:
-        return in_safe(in, link);
+        return in_safe(in);
     }
   }
 
@@ -224,8 +226,8 @@ class Contactors {
     us = us >= most || step_us >= most - us ? most : us + step_us;
   }
 
-  constexpr void in_off(const ContactorInput& in, const DcLink& link) {
-    check_opened(in, link);
+  constexpr void in_off(const ContactorInput& in) {
+    check_opened(in);
     if (in.open || in.open_now) return enter(ContactorState::safe);
     if (in.coils_dead) last_request_ = in.request;  // the release of an emergency stop must not start the truck
     if (in.request == Request::none || in.request == last_request_ || blocked(in) || events_.welded) return;
@@ -241,8 +243,9 @@ class Contactors {
   }
 
   constexpr void in_self_test(const ContactorInput& in, const DcLink& link) {
-    check_opened(in, link);
-    if (link.known()) check_part(link);
+    check_opened(in);
+    if (link.known() && outputs_visible())
+      proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
     if (suspect_weld() || in_state_us_ < plan_->test_us) return;
     if (!proven_) return fail_precharge(link);
@@ -261,16 +264,6 @@ class Contactors {
     return events_.welded;
   }
 
-  /// Proves that the commanded contactor has closed, or that another one is closed. The voltages are known.
-  constexpr void check_part(const DcLink& link) {
-    const std::int32_t link_uv = link.link_uv();
-    if (lowest_link_uv_ == measurement::no_reading || link_uv < lowest_link_uv_) lowest_link_uv_ = link_uv;
-    if (part() > 0 && link_uv - lowest_link_uv_ > link.pack_uv / 8)
-      found_welded(part() == 1 ? Pole::minus : Pole::plus);
-    if (outputs_visible())
-      proven_ = proven_ || part() == 0 || (part() == 1 ? link.plus_at_pack() : link.minus_at_zero());
-  }
-
   constexpr void fail_precharge(const DcLink& link) {
     if (outputs_.main_minus && link.known() && !link.minus_at_zero()) return fail_to_close();
     enter(ContactorState::opening);
@@ -279,7 +272,7 @@ class Contactors {
 
   constexpr void in_precharge(const ContactorInput& in, const DcLink& link) {
     if (in.request == Request::none || blocked(in)) return enter(ContactorState::opening);
-    if (const Pole pole = closed_while_off(in, link); pole != Pole::none) found_welded(pole);
+    check_poles(in);
     if (suspect_weld()) return;
     const std::uint32_t half = in_state_us_ / plan_->half_time_constant_us;
     if (half >= ContactorPlan::max_half_time_constants) return fail_precharge(link);
@@ -332,7 +325,7 @@ class Contactors {
 
   constexpr void in_opening(const ContactorInput& in, const DcLink& link) {
     if (in_state_us_ < plan_->test_us) return;  // an arc, or the mean over the last sample
-    check_opened(in, link);
+    check_opened(in);
     const bool faulted = in.open || in.open_now;
     const bool certain = rests(in) && (link.known() || !plan_->dc_link);
     // Without readings a weld is neither proven nor excluded; nor can the contactors close again.
@@ -343,40 +336,39 @@ class Contactors {
       enter(ContactorState::off);
   }
 
-  constexpr void in_safe(const ContactorInput& in, const DcLink& link) {
-    if (in_state_us_ >= plan_->test_us) check_opened(in, link);
+  constexpr void in_safe(const ContactorInput& in) {
+    if (in_state_us_ >= plan_->test_us) check_opened(in);
     if (!in.open && !in.open_now && in.request == Request::none) enter(ContactorState::off);
   }
 
   /// Pole that is closed although its outputs are off.
-  constexpr Pole closed_while_off(const ContactorInput& in, const DcLink& link) const {
+  constexpr Pole closed_while_off(const ContactorInput& in) const {
     if (!outputs_visible()) return Pole::none;
     if (in.auxiliary.fitted && in.auxiliary.main_plus_closed && !outputs_.main_plus) return Pole::plus;
     if (in.auxiliary.fitted && in.auxiliary.main_minus_closed && !outputs_.main_minus) return Pole::minus;
-    return link.known() && !outputs_.any_closed() ? link.closed_pole() : Pole::none;
+    return weld_test_.pole();
   }
 
-  /// Checks for a weld while all contactors or one pole are open.
-  constexpr void check_opened(const ContactorInput& in, const DcLink& link) {
-    const bool flows = in.current_ua != measurement::no_reading && !rests(in);
-    const Pole pole = closed_while_off(in, link);
-    if (pole != Pole::none || flows) found_welded(pole);
-  }
-  /// pole: none or unknown if the current shows it.
-  constexpr void found_welded(Pole pole) {
+  constexpr void check_poles(const ContactorInput& in) {
+    const Pole pole = closed_while_off(in);
+    if (pole == Pole::none) return;
     events_.welded = true;
-    if (pole == Pole::plus || pole == Pole::minus)
-      welded_pole_ = pole;
-    else if (welded_pole_ == Pole::none)
-      welded_pole_ = Pole::unknown;
+    if (pole != Pole::unknown || welded_pole_ == Pole::none) welded_pole_ = pole;
+  }
+  /// Checks for a weld while all contactors or one pole are open. Which pole, a current does not show.
+  constexpr void check_opened(const ContactorInput& in) {
+    check_poles(in);
+    if (in.current_ua == measurement::no_reading || rests(in)) return;
+    events_.welded = true;
+    if (welded_pole_ == Pole::none) welded_pole_ = Pole::unknown;
   }
 
   const ContactorPlan* plan_;
   Guarded state_{static_cast<std::uint32_t>(ContactorState::off)};
   std::uint32_t in_state_us_ = 0, overrun_us_ = 0;
-  std::uint32_t unchanged_us_ = 0;                         ///< since the outputs changed, up to response_us
-  std::int32_t lowest_link_uv_ = measurement::no_reading;  ///< of this self-test
+  std::uint32_t unchanged_us_ = 0;  ///< since the outputs changed, up to response_us
   std::int32_t first_gap_uv_ = measurement::no_reading, last_gap_uv_ = measurement::no_reading;  ///< of this precharge
+  WeldTest weld_test_;
   std::uint8_t last_half_ = 0;            ///< half time constant of last_gap_uv_
   Request last_request_ = Request::none;  ///< the request that was followed last; only a new request is followed again
   Pole welded_pole_ = Pole::none;

@@ -5,11 +5,10 @@
 //
 //   main plus or precharge relay closed   L+ = pack, L- = pack - DC link
 //   main minus closed                     L- = 0, L+ = DC link
-//   all open                              L+ at most half of the DC link and 2 V more
+//   all open                              L+ half of the DC link and 2 V more, if nothing leaks to the frame
 //
-//   L+ = pack, L- not 0    the plus pole is closed
-//   L- = 0, L+ not pack    the minus pole is closed, if the DC link has more than 6 V; an emptier one floats near 0
-//   L+ = pack, L- = 0      DC link = pack: a pole is closed, and the voltages do not show which
+// L+ = pack: the plus pole may be closed. L- = 0: the minus pole may be closed. A leak to the frame moves open poles,
+// too, so one set of readings proves nothing (weld_test.hpp).
 //
 // `=` is within a sixteenth of the pack for L+ and within 1 V for L-. Dividers of 0.1 % are good to 0.4 V, of 1 % to 2
 // V and 0.8 V.
@@ -37,11 +36,6 @@ struct DcLink {
   constexpr bool plus_at_pack() const { return magnitude(plus_uv - pack_uv) <= pack_uv / 16; }
   constexpr bool minus_at_zero() const { return magnitude(minus_uv) <= zero_uv; }
 
-  /// Pole that is closed. Valid while all outputs are off.
-  constexpr Pole closed_pole() const {
-    if (plus_at_pack()) return minus_at_zero() ? Pole::unknown : Pole::plus;
-    return minus_at_zero() && link_uv() > decidable_uv ? Pole::minus : Pole::none;
-  }
   /// Returns true if a pole is certainly open. Valid while both main contactors are commanded to close: a load or a
   /// stale reading of the pack does not cause such a difference.
   constexpr bool pole_lost() const { return plus_uv < pack_uv / 4 * 3 || magnitude(minus_uv) > pack_uv / 4; }

@@ -353,15 +353,15 @@ class Matrix {
     ++c.in_precharge;
     return pack_uv * (1 - std::exp(-0.2 * c.in_precharge));
   }
-  /// The DC link rises by an eighth with the precharge contactor alone.
-  static double link_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
+  /// Both poles of an empty DC link are a little less or more than 1/256 of the pack below it, until the precharge
+  /// relay alone brings them to the pack.
+  static plant::LinkPoles poles_of_welded(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
     const Outputs o = truck.outputs();
-    if (o.precharge && !o.main_minus) {
-      c.condition_holds(c.above);
-      return pack_uv / 8 + (c.above ? 1 : 0);
-    }
-    if (o.precharge && o.main_minus && !o.main_plus) return precharged(c, pack_uv);
-    return truck.is_closed() ? pack_uv : 0;
+    if (o.main_plus) return poles(truck, pack_uv, pack_uv);
+    if (o.main_minus) return poles(truck, pack_uv, o.precharge ? precharged(c, pack_uv) : 0);
+    if (o.precharge) c.condition_holds(c.above);
+    const double both_v = 1e-6 * pack_uv * (o.precharge ? 1 : 1 - (c.above ? 0.95 : 1.05) / 256);
+    return {both_v, both_v};
   }
   /// L+ is a sixteenth below the pack voltage with both contactors closed.
   static double link_of_not_closed(ContactorCase& c, const BoardTruck& truck, std::int32_t pack_uv) {
@@ -378,7 +378,7 @@ class Matrix {
       };
     };
     if (c.fault == precharge) from(link_of_precharge);
-    if (c.fault == welded) from(link_of_welded);
+    if (c.fault == welded) truck.link = [&](const TruckPack& t) { return poles_of_welded(c, truck, t.sample.pack_uv); };
     if (c.fault == not_closed) from(link_of_not_closed);
   }
 

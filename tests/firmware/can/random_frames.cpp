@@ -1,7 +1,7 @@
 // Prints frames of every message of the DBC file with random values, values beyond the range and values that are not
 // known. One line each: {"id": 384, "data": "0f...", "values": {"Soc": 54.3, "SocSigma": null, ...}}
 //
-//   random_frames SEED COUNT [j1939]        j1939: messages of firmware/can/j1939_profile.dbc
+//   random_frames SEED COUNT [j1939|parallel]        messages of firmware/can/j1939_profile.dbc or parallel_bus.dbc
 //
 // values: the input, clamped to the range of the signal; null: not known. decode_frames.py decodes the frames with
 // another decoder.
@@ -16,6 +16,7 @@
 
 #include "can_messages.hpp"
 #include "j1939_messages.hpp"
+#include "parallel_messages.hpp"
 
 namespace {
 
@@ -101,10 +102,12 @@ void lines(std::tuple<Message...>*) {
 
 int main(int argc, char** argv) {
   chance.seed(argc > 1 ? static_cast<unsigned>(std::atoi(argv[1])) : 1);
-  const bool j1939 = argc > 3 && std::string(argv[3]) == "j1939";
+  const std::string of = argc > 3 ? argv[3] : "";
   for (int k = argc > 2 ? std::atoi(argv[2]) : 100; k > 0; --k) {
-    if (j1939)
+    if (of == "j1939")
       lines(static_cast<can::j1939::Messages*>(nullptr));
+    else if (of == "parallel")
+      lines(static_cast<can::parallel::Messages*>(nullptr));
     else
       lines(static_cast<can::Messages*>(nullptr));
   }

@@ -16,10 +16,13 @@ namespace {
 
 using enum ContactorState;
 
-/// The bytes that determine all later steps.
+/// The bytes that determine all later steps. Outputs uses the lower half of its byte, and the compiler leaves anything
+/// in the upper one: without the mask each state counts up to 16 times.
 std::array<std::uint8_t, sizeof(Contactors)> bytes(const Contactors& c) {
   std::array<std::uint8_t, sizeof(Contactors)> all{};
   std::memcpy(all.data(), &c, sizeof c);
+  const auto at = reinterpret_cast<std::uintptr_t>(&c.outputs()) - reinterpret_cast<std::uintptr_t>(&c);
+  all.at(at) &= 0x0F;
   return all;
 }
 

@@ -99,6 +99,8 @@ TEST(Protection, AFailedPrechargeAndAWeldedContactorReachTheTable) {
   welded.inputs.request = Request::none;
   welded.plus_welded = true;
   welded.run(20);
+  welded.inputs.request = Request::drive;  // nothing discharges the DC link, so the next start finds the weld
+  welded.run(20);
   EXPECT_EQ(welded.protection.decision().latched, bit(Fault::contactor_welded));
   EXPECT_EQ(welded.protection.decision().welded_pole, Pole::plus);
 

@@ -12,11 +12,12 @@
 
 namespace bms::protection {
 
-/// Voltage at the far end of a divider of 1 Mohm, with 56 kohm to C0 and 56 kohm to VDDA, from its pin. The converter
-/// has 12 bits of VDDA; VDDA itself is known to 0.1 % by the internal reference.
-inline std::int32_t divided_uv(double pin_v, double vdda_v) {
-  const double counts = std::round(std::clamp(4'095 * pin_v / vdda_v, 0.0, 4'095.0));
-  const double shown_v = 1.001 * vdda_v * (counts / 4'095 * (1 + 2e6 / 56e3) - 1e6 / 56e3);
+/// Voltage at the far end of a divider, with 56 kohm to C0 and 56 kohm to VDDA, from its pin. Nominal: 1 Mohm, for more
+/// than 16 cells 2 Mohm. The converter has 12 bits of VDDA; VDDA itself is known to 0.1 % by the internal reference.
+inline std::int32_t divided_uv(double pin_v, double vdda_v, std::size_t cells) {
+  const double upper_ohm = cells > 16 ? 2e6 : 1e6,
+               counts = std::round(std::clamp(4'095 * pin_v / vdda_v, 0.0, 4'095.0));
+  const double shown_v = 1.001 * vdda_v * (counts / 4'095 * (1 + 2 * upper_ohm / 56e3) - upper_ohm / 56e3);
   return static_cast<std::int32_t>(1e6 * shown_v);
 }
 
@@ -42,8 +43,8 @@ class WiredTruck {
     in.open_now = open_now;
     in.current_ua = static_cast<std::int32_t>(std::lround(1e6 * truck.current_a()));
     in.pack_uv = static_cast<std::int32_t>(1e6 * pack_v_);
-    in.link_plus_uv = divided_uv(pins.pc1_v, pins.vdda_v);
-    in.link_minus_uv = divided_uv(pins.pc0_v, pins.vdda_v);
+    in.link_plus_uv = divided_uv(pins.pc1_v, pins.vdda_v, truck.cell_count());
+    in.link_minus_uv = divided_uv(pins.pc0_v, pins.vdda_v, truck.cell_count());
     in.auxiliary = {auxiliary_, pins.pb14_v < 1, pins.pb15_v < 1};
     in.contact_lost = lost_;
     watched_ = {in.auxiliary.fitted && in.auxiliary.main_plus_closed && outputs_.main_plus,
