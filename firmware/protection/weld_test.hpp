@@ -24,7 +24,10 @@ namespace bms::protection {
 class WeldTest {
  public:
   /// With every new state of the contactors, and with the self-test.
-  constexpr void restart() { held_ = 0; }
+  constexpr void restart() {
+    held_ = 0;
+    gap_uv_ = minus_uv_ = 0;  // else the walk over all states would count each by what no longer matters
+  }
   /// at_rest: main plus and main minus are off, and the contactors at rest. relay: the precharge relay is closed. A
   /// missing reading changes nothing but the answer.
   constexpr void update(bool at_rest, bool relay, const DcLink& link) {
