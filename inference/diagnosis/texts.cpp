@@ -128,8 +128,7 @@ std::string no_mismatch_text(const Diagnosis& d, const RecordingFacts& facts) {
   const std::string limits = telling_limits(d, facts);
   return fmt::format(
       "The cell file reproduces the recording to {}, which is within its tolerance: with its parameters moved inside "
-      "of "
-      "that, {} remain.{}{} {}",
+      "of that, {} remain.{}{} {}",
       millivolts(facts.error_v), millivolts(d.unexplained_rmse_v),
       limits.empty() ? "" : " The recording would have revealed " + limits + ".", not_visible_text(d), no_action);
 }
