@@ -145,7 +145,7 @@ class DiagnoseCommand final : public Command {
         "the calibrated cell of a pack in series, as --cell: compares the cells v_1 to v_N of one recording "
         "with each other and names the cell, channel, connection or sensor that is at fault");
     which.require_option(1);
-    c.add_option("--recording", o_.recordings, "recordings to diagnose, the earliest first")
+    c.add_option("--recording,recording", o_.recordings, "recordings to diagnose, the earliest first")
         ->required()
         ->type_name("FILE");
     c.add_option("--holdout", o_.holdouts,

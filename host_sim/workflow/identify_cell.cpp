@@ -235,6 +235,12 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   const auto groups = grouped(inputs, p.reference_temperature_c);
   const std::size_t main_group = nearest_to_reference(groups, p.reference_temperature_c);
   const Group& main = groups[main_group];
+  // a law that recordings or slow runs at several temperatures determine moves the tables to the stated one
+  const bool moved = options.extend && (groups.size() > 1 || start.ocv.temperatures > 1);
+  if (!options.reference_temperature_c && !moved) {
+    double& reference_c = start.cell.parameters.reference_temperature_c;
+    reference_c = reference_of(reference_c, main.temperature_c);
+  }
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(inputs.soc_min, inputs.soc_max) : options.nodes;
   grey_box.bounds = circuit_bounds(p.capacity_ah);

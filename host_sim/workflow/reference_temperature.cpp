@@ -6,6 +6,12 @@
 
 namespace bms::workflow {
 
+namespace {
+
+constexpr double near_k = 5;  ///< as far apart as recordings of one temperature can be
+
+}  // namespace
+
 void state_reference(files::CellFile& cell, bool ocv_identified) {
   for (model::MechanismSetting& m : cell.mechanisms) {
     if (m.index == model::mechanism_index_of<model::EntropicOcv> && !ocv_identified) continue;
@@ -16,9 +22,12 @@ void state_reference(files::CellFile& cell, bool ocv_identified) {
   }
 }
 
+double reference_of(double stated_c, double identified_c) {
+  return std::abs(identified_c - stated_c) <= near_k ? stated_c : identified_c;
+}
+
 void check_reference(const files::CellFile& cell, double identified_c, bool moved,
                      std::vector<measurement::Warning>& warnings) {
-  constexpr double near_k = 5;  // as far apart as recordings of one temperature can be
   const double reference_c = cell.parameters.reference_temperature_c;
   if (moved || std::abs(identified_c - reference_c) <= near_k) return;
   warnings.push_back({"reference_temperature",

@@ -282,7 +282,7 @@ TEST_F(DiagnoseTool, DataWithoutInformationIsNotTestable) {
                                           "still.csv", 2'000, 1, [](int) { return std::nan(""); }, level)},
   };
   for (const auto& c : cases) {
-    const json r = result("--cell table9 --recording " + c.file);
+    const json r = result(c.file + " --cell table9");  // as bms replay takes it, and with its option elsewhere
     EXPECT_THAT(r["verdict"].get<std::string>(), AnyOf("NOT_TESTABLE", "DATA_FAULT")) << c.what;
     EXPECT_TRUE(r["mechanisms"].empty()) << c.what;
     EXPECT_TRUE(r["isolability"]["ids"].empty() && r["isolability"]["separable"].empty()) << c.what;

@@ -91,7 +91,7 @@ TEST_F(IdentifyTool, RefusesBadDataInOneLineThatNamesIt) {
     EXPECT_THAT(run.err, HasSubstr(what)) << arguments;
     EXPECT_FALSE(std::filesystem::exists(path("none.toml"))) << arguments;
   };
-  refused("--recording " + path("rest.csv"),
+  refused(path("rest.csv"),  // as bms replay takes it, and with its option below
           "so r0_ohm, r1_ohm and c1_f cannot be identified, expected current pulses");
   refused("--recording " + shift + " --window 0.1:0.05", "0 samples in the window of 0.1 to 0.05");
   refused("--recording " + shift + " --window 0.1", "expected HI:LO");
@@ -264,8 +264,15 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   EXPECT_THAT(plain["warnings"].dump(), Not(HasSubstr("reference_temperature")));
 
   const json far = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5");
-  EXPECT_THAT(content(path("cell.toml")), Not(HasSubstr("reference_temperature_c")));
-  EXPECT_THAT(far["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
+  EXPECT_THAT(content(path("cell.toml")), HasSubstr("\nreference_temperature_c = -10.0\n"));
+  EXPECT_THAT(far["warnings"].dump(), Not(HasSubstr("reference_temperature")));
+  // a cell that is as it was at -10 degrees C has no resistance that has followed the temperature
+  ASSERT_EQ(run_tool("diagnose " + cold + " --cell " + path("cell.toml") + " --initial-soc 0.6 --json " + path("d.json"))
+                .exit_code,
+            0);
+  EXPECT_EQ(json::parse(content(path("d.json")))["verdict"], "NO_MISMATCH");
+  const json told = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5 --reference-temperature 25");
+  EXPECT_THAT(told["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
 }
 
 TEST_F(IdentifyTool, AnExtendedFileLearnsWhatItLeavesUnexplainedOfItsOwnRecordings) {

@@ -37,5 +37,11 @@ TEST(ReferenceTemperature, IdentifiedTablesChangeTheReferenceOfWhatBelongsToThem
   EXPECT_EQ(reference(2, 4), 20);
 }
 
+TEST(ReferenceTemperature, IsThatOfRecordingsThatAreFarFromTheStatedOne) {
+  EXPECT_EQ(reference_of(25, 4.2), 4.2);
+  EXPECT_EQ(reference_of(25, 41), 41);
+  EXPECT_EQ(reference_of(25, 29.9), 25) << "a recording that warms the cell";
+}
+
 }  // namespace
 }  // namespace bms::workflow
