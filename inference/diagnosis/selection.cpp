@@ -107,11 +107,13 @@ class Elimination {
     return false;
   }
 
-  /// Returns true if something as simple that was fitted on the way is better by what is needed to be found, credible,
-  /// and has what is certain: what was dropped last had taken its place. That has become the best.
+  /// Returns true if something that was fitted on the way is better with as many causes or fewer, credible, and has
+  /// what is certain: what was dropped last had taken its place. That has become the best. Each cause more must gain
+  /// what is needed to be found, also over fewer that are others: two at their bounds do what one does well.
   bool resume() {
     const std::size_t most = std::max<std::size_t>(found_.best.hypothesis.added().size(), 1);
     const HypothesisFit* better = nullptr;
+    double least = burdened(found_.best);
     for (const auto& known : search_.best_of_each()) {
       const std::vector<std::size_t>& mechanisms = known.first;
       const HypothesisFit& fit = known.second;
@@ -120,9 +122,11 @@ class Elimination {
             return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
                    is_credible(fit, m);
           });
-      const double needed = search_.score(better != nullptr ? *better : found_.best) -
-                            (better != nullptr ? 0 : selection_limits.detected);
-      if (allowed && mechanisms.size() <= most && search_.score(fit) < needed) better = &fit;
+      const bool as_many = better == nullptr && mechanisms.size() == found_.best.hypothesis.added().size();
+      if (!allowed || mechanisms.size() > most || burdened(fit) >= least - (as_many ? selection_limits.detected : 0))
+        continue;
+      better = &fit;
+      least = burdened(fit);
     }
     if (better == nullptr) return false;
     found_ = {*better, {}, {}, {}};
@@ -144,6 +148,11 @@ class Elimination {
   }
 
  private:
+  /// Score with what each cause must gain to be found: the smaller the better.
+  double burdened(const HypothesisFit& f) {
+    return search_.score(f) + selection_limits.detected * static_cast<double>(f.hypothesis.added().size());
+  }
+
   /// Returns true if it has what is certain in most of the recording and the best has.
   bool keeps_certain(const HypothesisFit& f) const {
     return std::all_of(scope_.kept.begin(), scope_.kept.end(), [&](std::size_t m) {
@@ -293,18 +302,24 @@ Scope scope_of(const LikelihoodModel& likelihood) {
 Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std::size_t most) {
   Grown grown{control, {}, {}};
   HypothesisFit& current = grown.fit;
+  std::vector<std::size_t> steady = scope.searched;
+  std::erase_if(steady, is_intermittent);
+  // one cause alone is compared with what is certain beforehand as well: with a strength that nothing limits, that one
+  // may take the place of any other
+  if (!scope.expected.empty()) grown.singles = search.one_more(control, steady);
   for (const std::size_t m : scope.expected) {
     const std::vector<HypothesisFit> fits = search.one_more(current, {m});
     if (fits.empty()) continue;
     const double gain = grown.gains[m] = search.gain(current, fits.front());
     if (gain > selection_limits.detected) current = fits.front();
   }
-  std::vector<std::size_t> steady = scope.searched;
-  std::erase_if(steady, is_intermittent);
   bool all = false;
   while (current.hypothesis.added().size() < most && !search.stopped()) {
-    std::vector<HypothesisFit> fits = search.one_more(current, all ? scope.searched : steady);
-    if (current.hypothesis.added().empty()) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
+    const bool alone = current.hypothesis.added().empty();
+    std::vector<HypothesisFit> fits = alone && !all && !grown.singles.empty()
+                                          ? grown.singles
+                                          : search.one_more(current, all ? scope.searched : steady);
+    if (alone && (all || grown.singles.empty())) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
     std::erase_if(fits, [&](const HypothesisFit& f) { return !search.improves_lasting_error(current, f); });
     for (const HypothesisFit& f : fits) {
       double& gain = grown.gains[f.hypothesis.settings.back().index];
