@@ -247,8 +247,8 @@ class IdentifyCommand final : public Command {
         ->check(Within(1e-4, 1e3));
     c.add_flag("--remove-offset", o_.remove_offset, "subtract the mean current of the rests");
     c.add_option("--reference-temperature", o_.reference_temperature_c,
-                 "temperature in degrees C at which the tables of the cell file are valid; if not given that of --start, "
-                 "or of the recordings if they are more than 5 K away from it")
+                 "temperature in degrees C at which the tables of the cell file are valid; if not given that of "
+                 "--start, or of the recordings if they are more than 5 K away from it")
         ->check(Within(model::accepted::reference_temperature_c.low, model::accepted::reference_temperature_c.high));
     c.add_option("--capacity-ah", o_.capacity_ah, "capacity in Ah; that of the OCV recordings if not given")
         ->check(Within(0.01, 1000.0));

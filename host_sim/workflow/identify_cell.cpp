@@ -195,12 +195,10 @@ std::vector<Group> grouped(const Inputs& inputs, double reference_c) {
 
 /// Index of the group whose temperature is nearest to the reference.
 std::size_t nearest_to_reference(std::span<const Group> groups, double reference_c) {
-  std::size_t nearest = 0;
-  for (std::size_t k = 0; k < groups.size(); ++k) {
-    if (std::abs(groups[k].temperature_c - reference_c) < std::abs(groups[nearest].temperature_c - reference_c))
-      nearest = k;
-  }
-  return nearest;
+  const auto nearest = std::min_element(groups.begin(), groups.end(), [&](const Group& a, const Group& b) {
+    return std::abs(a.temperature_c - reference_c) < std::abs(b.temperature_c - reference_c);
+  });
+  return static_cast<std::size_t>(nearest - groups.begin());
 }
 
 /// The table of each group. OCV and branch position are those of the main group.
@@ -235,12 +233,9 @@ double fit_grey_box(const IdentifyOptions& options, StartCell& start, const Inpu
   const auto groups = grouped(inputs, p.reference_temperature_c);
   const std::size_t main_group = nearest_to_reference(groups, p.reference_temperature_c);
   const Group& main = groups[main_group];
-  // a law that recordings or slow runs at several temperatures determine moves the tables to the stated one
   const bool moved = options.extend && (groups.size() > 1 || start.ocv.temperatures > 1);
-  if (!options.reference_temperature_c && !moved) {
-    double& reference_c = start.cell.parameters.reference_temperature_c;
-    reference_c = reference_of(reference_c, main.temperature_c);
-  }
+  if (!options.reference_temperature_c && !moved)
+    start.cell.parameters.reference_temperature_c = reference_of(p.reference_temperature_c, main.temperature_c);
   id::GreyBoxOptions grey_box;
   grey_box.soc_nodes = options.nodes.empty() ? id::nodes_for(inputs.soc_min, inputs.soc_max) : options.nodes;
   grey_box.bounds = circuit_bounds(p.capacity_ah);

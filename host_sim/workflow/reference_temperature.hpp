@@ -13,8 +13,9 @@ namespace bms::workflow {
 void state_reference(files::CellFile& cell, bool ocv_identified);
 
 /// Reference temperature of tables that were identified at identified_c: that of the start, stated_c, or where the
-/// recordings are farther from it than recordings of one temperature can be, theirs. A table of 4 degrees C that is said
-/// to be of 25 makes every recording at 4 look as if its resistances had followed the temperature.
+/// recordings are farther from it than recordings of one temperature can be, theirs. A table of 4 degrees C that is
+/// said to be of 25 makes every recording at 4 look as if its resistances had followed the temperature. Not for tables
+/// that a law moves to stated_c, from recordings or slow runs at several temperatures.
 double reference_of(double stated_c, double identified_c);
 
 /// Warns if [rc] is not at the temperature that the cell file states. identified_c: temperature of its recordings.

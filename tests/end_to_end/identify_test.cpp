@@ -267,12 +267,11 @@ TEST_F(IdentifyTool, ResistancesAreThoseOfTheReferenceTemperature) {
   EXPECT_THAT(content(path("cell.toml")), HasSubstr("\nreference_temperature_c = -10.0\n"));
   EXPECT_THAT(far["warnings"].dump(), Not(HasSubstr("reference_temperature")));
   // a cell that is as it was at -10 degrees C has no resistance that has followed the temperature
-  ASSERT_EQ(run_tool("diagnose " + cold + " --cell " + path("cell.toml") + " --initial-soc 0.6 --json " + path("d.json"))
-                .exit_code,
-            0);
+  const std::string diagnose = "diagnose " + cold + " --cell " + path("cell.toml") + " --initial-soc 0.6 --json ";
+  ASSERT_EQ(run_tool(diagnose + path("d.json")).exit_code, 0);
   EXPECT_EQ(json::parse(content(path("d.json")))["verdict"], "NO_MISMATCH");
-  const json told = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5 --reference-temperature 25");
-  EXPECT_THAT(told["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
+  const json stated = result("--recording " + cold + " --initial-soc 0.6 --nodes 0.5 --reference-temperature 25");
+  EXPECT_THAT(stated["warnings"].dump(), HasSubstr("identified at -10 degrees C"));
 }
 
 TEST_F(IdentifyTool, AnExtendedFileLearnsWhatItLeavesUnexplainedOfItsOwnRecordings) {
