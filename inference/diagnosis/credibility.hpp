@@ -22,7 +22,8 @@ bool is_uncertain(const HypothesisFit& f, std::size_t mechanism, const std::set<
 bool is_implausible(const HypothesisFit& f, std::size_t mechanism, const RecordingFacts& facts);
 
 /// Returns true for a contact that is open only at the end of records, in the last twelfth of each
-/// (thresholds.decision. end_share): bursts that begin there, or a change of a single record.
+/// (thresholds.decision.end_share): bursts that begin there, or a change of a single record. At one current a lost
+/// capacity or an offset of the current moves the knee there, and such a contact took its place.
 bool is_at_the_end(const HypothesisFit& f, std::size_t mechanism, const std::vector<PreparedRecording>& records);
 
 }  // namespace bms::diagnosis

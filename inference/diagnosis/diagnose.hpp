@@ -1,6 +1,6 @@
 // The whole chain: is the data usable, does the cell file explain it, which mechanism would explain the rest, is that
-// more than chance, and what is left. README.md gives the reasons, docs/diagnosis_method.md the equations,
-// thresholds.hpp the numbers.
+// more than chance, and what is left. README.md lists the phases, docs/diagnosis_method.md has the equations,
+// thresholds.hpp the numbers. Reasons stand at the lines that they defend.
 #pragma once
 
 #include <cstddef>

@@ -1,6 +1,6 @@
 // What an effect of known size would gain in a recording: the recording as it is, with the effect put in. Far above the
 // noise this is less than the square of its size over its standard deviation, because a hypothesis without it is judged
-// with the noise that it leaves.
+// with the noise that it leaves. Detection limits counted back by the square were too small.
 #pragma once
 
 #include "diagnosis/likelihood_model.hpp"

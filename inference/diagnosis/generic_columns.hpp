@@ -1,4 +1,5 @@
-// Columns without physics over all recordings, in families that are tested one by one.
+// Columns without physics over all recordings, in families that are tested one by one. No family is a curve over the
+// current alone: a phase of constant current turns it into a drift.
 #pragma once
 
 #include <span>

@@ -5,7 +5,8 @@
 // table over the state of charge: hat functions with a prior, as the calibration has them (calibration.hpp), with a
 // standard deviation several times the tolerance. The factor is the one with the smallest error on parts of the
 // recordings that are left out in turn. The term of the slow polarisation is a mechanism, load_memory. Other laws have
-// no term. A term that does not improve the parts left out is not learned.
+// no term. A term that does not improve the parts left out is not learned: one that fitted its recording increased the
+// error of a hold-out from 2.8 to 3.1 mV.
 #pragma once
 
 #include <optional>

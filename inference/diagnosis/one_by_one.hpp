@@ -1,5 +1,6 @@
-// Several recordings together can be harder to explain than each of them: contacts differ from one to the next, a cell
-// ages. A cause visible in one recording must not be lost by adding others.
+// Several recordings together can be harder to explain than each of them: contacts differ by a percent from one to the
+// next (two discharges with a contact read UNKNOWN together), a cell ages. A cause visible in one recording must not be
+// lost by adding others.
 #pragma once
 
 #include <functional>

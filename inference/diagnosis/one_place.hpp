@@ -3,6 +3,10 @@
 // A cell file's tolerance is that of its tables. At the end of a discharge, or after the load, any model is off by
 // more, and some mechanism always fits one such place. A fault acts wherever its current flows. Without healthy
 // recordings of the cell nothing says how wrong the model is there.
+//
+// Without this rule 29 of 68 healthy discharges of NASA cells had a cause. In all of them nine tenths of the gain came
+// from one twelfth of the recording, mostly the end of the load, in half of them from one reading. In synthetic cases
+// the gain is spread.
 #pragma once
 
 #include <cstddef>

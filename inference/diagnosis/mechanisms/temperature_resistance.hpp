@@ -59,6 +59,7 @@ struct Knowledge<model::TemperatureResistance> : DefaultKnowledge<model::Tempera
     const auto relative = [&](std::size_t p) { return s.value[p] > 0 ? s.deviation[p] / s.value[p] : infinite; };
     return std::min(std::hypot(relative(r0_energy), relative(r0_share)), relative(r1_energy));
   }
+  /// It is added before the others: a contact that changed early would take its place.
   static bool expected(const model::CellParameters<>&, const RecordingFacts& seen) { return seen.away_k > certain_k; }
   static double prior_gain(const RecordingFacts& seen) {
     return std::clamp((seen.away_k - prior_from_k) * prior_per_k, 0.0, prior_at_most);
