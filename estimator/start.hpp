@@ -34,20 +34,24 @@ constexpr bool rests(const arithmetic::Current<S>& current_a, const model::Filte
 
 inline constexpr int start_points = 256;
 
-/// A prior may be entirely wrong: then every SOC is as probable, and a voltage that clearly contradicts the prior wins.
-/// one_in_a_hundred: how often a first estimate expects that; even_odds: whoever checks a prior takes no side, because
-/// a wrong SOC that lasts is worse than a wide sigma.
-enum class WrongPrior : std::uint8_t { one_in_a_hundred, even_odds };
+/// How often a prior is entirely wrong: then every SOC is as probable, and a voltage that clearly contradicts the prior
+/// wins.
+enum class WrongPrior : std::uint8_t {
+  one_in_ten_thousand,  ///< for an estimate with a sigma: that of a right start. A normal distribution cannot state the
+                        ///< chance of a wrong one; with one in a hundred a sigma of 2 % would become 2.8 %
+  one_in_a_hundred,     ///< for a bank, which can state it
+  even_odds,            ///< whoever checks a prior takes no side: a wrong SOC that lasts is worse than a wide sigma
+};
 
 /// Misfit of a SOC if the prior is wrong, above that of the prior's mean: ln(odds / (sqrt(2 pi) sigma)), >= 0.
 template <class S>
 constexpr arithmetic::Exponent<S> wrong_prior_misfit(const arithmetic::Variance<S>& variance, WrongPrior wrong) {
-  constexpr double of_one_thousandth = 5.9888, of_a_hundred = 4.6052;  // ln(1 / (sqrt(2 pi) 0.001)), ln 100
-  const arithmetic::Current<S> even =
-      arithmetic::Current<S>(arithmetic::Current<S>(of_one_thousandth) - SocBank<S>::half_log(variance));
-  const auto misfit =
-      wrong == WrongPrior::even_odds ? even : arithmetic::Current<S>(even + arithmetic::Current<S>(of_a_hundred));
-  return arithmetic::Exponent<S>(misfit > arithmetic::Current<S>(0) ? misfit : arithmetic::Current<S>(0));
+  using Misfit = arithmetic::Current<S>;
+  constexpr double of_one_thousandth = 5.9888, ln_100 = 4.6052;  // of_one_thousandth: ln(1 / (sqrt(2 pi) 0.001))
+  auto misfit = Misfit(Misfit(of_one_thousandth) - SocBank<S>::half_log(variance));
+  if (wrong != WrongPrior::even_odds)
+    misfit = Misfit(misfit + Misfit(wrong == WrongPrior::one_in_a_hundred ? ln_100 : 2 * ln_100));
+  return arithmetic::Exponent<S>(misfit > Misfit(0) ? misfit : Misfit(0));
 }
 
 /// Misfit of a SOC to a prior, >= 0, with the interface of StartMisfit.
@@ -95,7 +99,7 @@ struct StartMisfit {
   const Cell& cell;
   const Reading* reading;            ///< nullptr if it is missing
   const SocDistribution<S>* before;  ///< the prior, as in PriorMisfit; nullptr if it is missing
-  WrongPrior wrong = WrongPrior::one_in_a_hundred;
+  WrongPrior wrong = WrongPrior::one_in_ten_thousand;
 
   /// half_step: half the spacing of the points for which this is called.
   constexpr arithmetic::Exponent<S> operator()(const arithmetic::Soc<S>& soc, const arithmetic::Fraction<S>& half_step,

@@ -86,6 +86,19 @@ TEST(SocEstimator, FirstEstimateIsTheStartingPointWhereNoVoltageHelps) {
   EXPECT_NEAR(e.soc_sigma, 0.005, 1e-6);
 }
 
+/// The bank of hypotheses has the chance that a start is entirely wrong, sigma has not.
+TEST(SocEstimator, AStartThatTheVoltageAgreesWithIsAsSureAsItWasGiven) {
+  const auto cell = table9<float>();
+  for (const double sigma : {0.01, 0.02, 0.028}) {
+    for (const double off : {-1.5, 0.0, 1.5}) {  // on the plateau: 8 mV in a quarter of the charge
+      SocEstimator<float> estimator(starting_at(0.5 + off * sigma, sigma));
+      const auto e = estimator.step(cell, {0, 0, 3'287'000, 2'500});
+      EXPECT_NEAR(e.soc, 0.5 + off * sigma, 0.2 * sigma) << sigma;
+      EXPECT_LT(e.soc_sigma, 1.1 * sigma) << off;
+    }
+  }
+}
+
 TEST(SocEstimator, AStartingPointBeyondTheEndsIsClampedToThem) {
   const std::vector<measurement::Sample> no_voltage = {{0, 0, measurement::no_reading, 2'500}};
   const auto first = [&](const measurement::StartingPoint& from) {
