@@ -2,7 +2,7 @@
 #                  [DC_LINK true|false] [TRUCK_STATED true|false] [PRECHARGE_S S] [CLOSING_A A] [CLOSING_OHM OHM]
 #                  [VEHICLE_PROFILE none|cia418|j1939|elcon] [CANOPEN_NODE N] [CANOPEN_CHARGER N]
 #                  [CAN_BIT_RATE R] [CAN_BASE ID] [CAN_STOP ID] [PARAMETERS true|false]
-#                  [CHARGER_BUS true|false] [CHARGER_BIT_RATE R]
+#                  [CHARGER_BUS true|false] [CHARGER_BIT_RATE R] [PARALLEL true|false]
 #                  [INPUTS BITS] [OUTPUTS BITS] [CLOSES_BY_INPUTS true|false] [INSULATION absent|pwm|iso175]
 #                  [SECOND_CURRENT true|false] [TRUCK_SIDE true|false] [BLEED_OHM OHM])
 #
@@ -27,6 +27,7 @@ function(bms_board_config name folder)
   set(bms_config_PARAMETERS true)
   set(bms_config_CHARGER_BUS false)
   set(bms_config_CHARGER_BIT_RATE 250000)
+  set(bms_config_PARALLEL false)
   set(bms_config_INPUTS 0)
   set(bms_config_OUTPUTS 7)
   set(bms_config_CLOSES_BY_INPUTS false)
@@ -36,7 +37,7 @@ function(bms_board_config name folder)
   set(bms_config_INSULATION absent)
   set(settings CELLS SAMPLE_PERIOD_S CURRENT_RANGE_A FIXED_POINT DC_LINK TRUCK_STATED PRECHARGE_S
     CLOSING_A CLOSING_OHM VEHICLE_PROFILE CANOPEN_NODE CANOPEN_CHARGER CAN_BIT_RATE CAN_BASE CAN_STOP
-    CHARGER_BUS CHARGER_BIT_RATE PARAMETERS INPUTS OUTPUTS CLOSES_BY_INPUTS INSULATION
+    CHARGER_BUS CHARGER_BIT_RATE PARALLEL PARAMETERS INPUTS OUTPUTS CLOSES_BY_INPUTS INSULATION
     SECOND_CURRENT TRUCK_SIDE BLEED_OHM)
   cmake_parse_arguments(arg "" "SOURCE;${settings}" "" ${ARGN})
   set(bms_config_source ${arg_SOURCE})

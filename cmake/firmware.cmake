@@ -23,6 +23,8 @@
 #                  as -DBMS_CAN_BIT_RATE=R
 #   BMS_CHARGER_BUS, BMS_CHARGER_BIT_RATE  can1: the charger is on the truck's bus; can2: on a bus of its own, with this
 #                  bit rate (hal/charger_bus.hpp). Also as -DBMS_CHARGER_BUS=can2
+#   BMS_PARALLEL   ON: one of two to four batteries at a DC link; CAN2 is the bus between them (firmware/parallel/). The
+#                  chip does not stop between samples then. Also as -DBMS_PARALLEL=ON
 #   BMS_PARAMETERS  true: parameters that a workshop sets over CAN (firmware/parameters/)
 #   BMS_SAMPLES    bq76952 (a chip on the board), adc (the controller), remote (another node), emulated
 #   BMS_DC_LINK    false: a single switch without a measured DC link and without precharge
@@ -53,7 +55,7 @@ set(root ${PROJECT_SOURCE_DIR})
 set(build ${PROJECT_BINARY_DIR})
 set(of_pack_and_truck CELLS BLEED_OHM PRECHARGE_S CLOSING_A CLOSING_OHM CAN_BIT_RATE CAN_BASE CAN_STOP
   CHARGER_BIT_RATE)
-set(of_inputs CHARGER_BUS INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SLEEPS SWITCHES_OFF)
+set(of_inputs CHARGER_BUS PARALLEL INPUTS OUTPUTS INSULATION SECOND_CURRENT CLOSES_BY_INPUTS SLEEPS SWITCHES_OFF)
 foreach(value ${of_pack_and_truck} ${of_inputs})
   if(DEFINED BMS_${value})
     set(wanted_${value} "${BMS_${value}}")  # OFF and an empty list are wishes, too
@@ -81,14 +83,14 @@ endif()
 list(REMOVE_ITEM BMS_INPUTS none)
 list(REMOVE_ITEM BMS_OUTPUTS none)
 set(may_stop false)
-if(BMS_SLEEPS AND BMS_SAMPLES STREQUAL "bq76952")
+if(BMS_SLEEPS AND NOT BMS_PARALLEL AND BMS_SAMPLES STREQUAL "bq76952")
   set(may_stop true)
 endif()
 set(switches_off false)
 if(BMS_SWITCHES_OFF)
   if(NOT may_stop OR NOT "key" IN_LIST BMS_INPUTS)
-    message(FATAL_ERROR "BMS_SWITCHES_OFF needs BMS_SAMPLES bq76952, BMS_SLEEPS and key among BMS_INPUTS: without a "
-      "key that is read, a battery that is being used switches itself off")
+    message(FATAL_ERROR "BMS_SWITCHES_OFF needs BMS_SAMPLES bq76952, BMS_SLEEPS and key among BMS_INPUTS, and no "
+      "BMS_PARALLEL: without a key that is read, a battery that is being used switches itself off")
   endif()
   set(switches_off true)
 endif()
@@ -131,6 +133,14 @@ if(BMS_CHARGER_BUS STREQUAL "can2")
 elseif(BMS_CHARGER_BUS AND NOT BMS_CHARGER_BUS STREQUAL "can1")
   message(FATAL_ERROR "BMS_CHARGER_BUS is ${BMS_CHARGER_BUS}, expected can1 or can2")
 endif()
+set(group_bus false)
+if(BMS_PARALLEL)
+  if(NOT BMS_CAN STREQUAL "bxcan" OR NOT BMS_PARAMETERS OR charger_bus OR NOT BMS_VEHICLE_PROFILE STREQUAL "none")
+    message(FATAL_ERROR "BMS_PARALLEL needs BMS_CAN bxcan, BMS_PARAMETERS, BMS_CHARGER_BUS can1 and "
+      "BMS_VEHICLE_PROFILE none: each profile speaks for one battery")
+  endif()
+  set(group_bus true)
+endif()
 option(BMS_PRODUCTION "an image for a product: nothing works without a device key of its own" OFF)
 if(NOT BMS_CURRENT_RANGE_A)
   set(BMS_CURRENT_RANGE_A 2147)  # the end of the range of a reading
@@ -153,7 +163,7 @@ bms_board_config(bms_board ${build}/generated SOURCE boards/${BMS_BOARD}/board.c
   ${of_truck} SAMPLE_PERIOD_S ${BMS_SAMPLE_PERIOD_S} CURRENT_RANGE_A ${BMS_CURRENT_RANGE_A}
   FIXED_POINT ${fixed_point} DC_LINK ${BMS_DC_LINK} TRUCK_STATED ${truck_stated}
   VEHICLE_PROFILE ${BMS_VEHICLE_PROFILE} CANOPEN_NODE ${BMS_CANOPEN_NODE} CANOPEN_CHARGER ${BMS_CANOPEN_CHARGER}
-  CHARGER_BUS ${charger_bus} PARAMETERS ${BMS_PARAMETERS}
+  CHARGER_BUS ${charger_bus} PARALLEL ${group_bus} PARAMETERS ${BMS_PARAMETERS}
   INPUTS ${input_bits} OUTPUTS ${output_bits} INSULATION ${BMS_INSULATION}
   CLOSES_BY_INPUTS ${closes_by_inputs} SECOND_CURRENT ${second_current_possible} TRUCK_SIDE ${truck_side})
 
@@ -206,6 +216,9 @@ include(${root}/cmake/can_messages.cmake)
 
 if(BMS_CELLS LESS_EQUAL 24)
   add_compile_definitions(BMS_STORED_CELLS=24)
+endif()
+if(NOT group_bus)
+  add_compile_definitions(BMS_WITHOUT_GROUP)
 endif()
 
 # bms_objects(NAME OPTIMISATION SOURCE...)
@@ -317,16 +330,23 @@ if(BMS_SAMPLES STREQUAL "bq76952" AND BMS_CELLS GREATER 16)
     target_compile_definitions(hal_isolated_bus PRIVATE BMS_ISOLATED_BUS)
   endif()
 endif()
-# The charger's own bus: the same driver on a second controller.
+# The charger's own bus, or that between batteries: the same driver on a second controller.
 set(second_can "")
 set(no_second_can "")
+set(second_bus "")
 if(charger_bus)
-  set(second_can hal_charger_bus)
-  bms_shared_objects(hal_charger_bus -Os ${chip}/bxcan.cpp)
+  set(second_bus charger_bus)
+elseif(group_bus)
+  set(second_bus group_bus)
+endif()
+if(second_bus)
+  set(second_can hal_${second_bus})
+  bms_shared_objects(hal_${second_bus} -Os ${chip}/bxcan.cpp)
   if(NOT BMS_SHARED_OBJECTS)
-    target_compile_definitions(hal_charger_bus PRIVATE BMS_CHARGER_BUS)
+    string(TOUPPER BMS_${second_bus} which)
+    target_compile_definitions(hal_${second_bus} PRIVATE ${which})
   endif()
-  set(no_second_can ${absent_hal}/charger_bus.cpp)
+  set(no_second_can ${absent_hal}/${second_bus}.cpp)
 endif()
 bms_shared_objects(hal_board -Os ${can_${BMS_CAN}} ${chip}/watchdog.cpp ${chip_state} ${absent_hal}/estimate_record.cpp)
 bms_shared_objects(hal_remote_samples -Os ${samples_remote})
@@ -463,6 +483,8 @@ if(NOT BMS_EMULATED)
     target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal10can_healthEv)
     if(charger_bus)
       target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal18charger_can_healthEv)
+    elseif(group_bus)
+      target_link_options(${image} PRIVATE -Wl,--undefined=_ZN3bms3hal16group_can_healthEv)
     endif()
   endforeach()
   set(linker_script ${root}/boards/${BMS_LOOP_BOARD}/memory.ld)

@@ -20,6 +20,7 @@
 #include "firmware/board_updates.hpp"
 #include "firmware/charger_frames.hpp"
 #include "firmware/commands.hpp"
+#include "firmware/group_side.hpp"
 #include "firmware/latched_faults.hpp"
 #include "firmware/parameter_commands.hpp"
 #include "firmware/power_requests.hpp"
@@ -29,6 +30,7 @@
 #include "firmware/stored_state.hpp"
 #include "firmware/telemetry.hpp"
 #include "firmware/truck_side.hpp"
+#include "firmware/without_profile.hpp"
 #include "hal/board_state.hpp"
 #include "hal/calendar.hpp"
 #include "hal/clock.hpp"
@@ -40,14 +42,6 @@
 #include "protection/protection.hpp"
 
 namespace bms::firmware {
-
-/// Only the battery's own messages. Other profiles: firmware/j1939_profile.hpp, firmware/cia418_profile.hpp.
-struct WithoutVehicleProfile {
-  template <class Estimator, std::size_t Cells>
-  constexpr void publish(const Snapshot<Estimator, Cells>&) {}
-  constexpr void receive(const can::Frame&, std::uint64_t) {}
-  constexpr ChargerState charger(std::uint64_t) const { return {}; }
-};
 
 template <class Board, class VehicleProfile = WithoutVehicleProfile>
 class Application {
@@ -92,6 +86,9 @@ class Application {
                             hal::can_listening() || inputs.request != protection::Request::none);
     if constexpr (cells > 1) Board::update_cells(cells_, pack, estimate);
     observe(pack, estimate);
+    if constexpr (hal::has_group_bus)
+      group_.update(Board::parameters().active(), pack.current_ua, Board::open_circuit_uv(estimator_, mean, estimate),
+                    protection_.decision(), Board::plan().contactors.rest_ua, pack.time_us, inputs);
     protect(pack, estimate, inputs, losses);
     truck_.judge_sensors(mean, inputs.second_current_ua, protection_.decision(), board_);
     for (std::size_t k = 0; cells > 1 && k < cells; ++k) {
@@ -146,7 +143,7 @@ class Application {
                                          .estimate = estimate,
                                          .condition = condition_,
                                          .cells = cells_,
-                                         .decision = protection_.decision(),
+                                         .decision = group_.published(protection_.decision()),
                                          .plan = Board::plan(),
                                          .persistence = persistence_,
                                          .board = board_,
@@ -384,6 +381,7 @@ class Application {
   [[no_unique_address]] PulsesOf<Board> pulses_;
   float capacity_ah_ = 0;
   TruckSide<has_ship_mode<Board>> truck_;
+  [[no_unique_address]] GroupSide<hal::has_group_bus> group_;
   Commands commands_;
   [[no_unique_address]] std::conditional_t<has_parameters, ParameterCommands, std::false_type> parameter_commands_;
   Requested requested_;

@@ -1,6 +1,8 @@
 // Functions of the board other than the estimator step. They are compiled for size, not for speed.
 #include "firmware/board_cell.hpp"
 
+#include "estimator/open_circuit_voltage.hpp"
+
 #include "firmware/board_pack.hpp"
 #include "firmware/board_tables.hpp"
 #include "firmware/pulse_model.hpp"
@@ -16,6 +18,15 @@ void BoardCell::update_condition(estimator::Condition<Estimator>& condition, con
 void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differences,
                              const measurement::PackSample<cells>& pack, const Estimator::Result& estimate) {
   differences.update(tables(), pack, estimate);
+}
+
+std::int32_t BoardCell::open_circuit_uv(const Estimator& estimator, const measurement::Sample& mean,
+                                        const Estimator::Result& estimate) {
+  if constexpr (hal::has_group_bus) {
+    const std::int32_t uv = estimator::open_circuit_uv(tables(), mean, estimate, estimator);
+    if (uv != measurement::no_reading) return static_cast<std::int32_t>(cells) * uv;
+  }
+  return measurement::no_reading;
 }
 
 PulseModel BoardCell::pulse_model(const Estimator& estimator, const Snapshot<Estimator, cells>& now) {

@@ -69,6 +69,9 @@ struct BoardCell : ParametersOfBoard<hal::has_parameters>, UpdateOfBoard<BMS_IN_
                                bool limits_wanted);
   static void update_cells(estimator::PackCells<BoardScalar, cells>& differences,
                            const measurement::PackSample<cells>& pack, const Estimator::Result& estimate);
+  /// Of the whole battery [uV]; measurement::no_reading while it is not known. For images of a group only.
+  static std::int32_t open_circuit_uv(const Estimator& estimator, const measurement::Sample& mean,
+                                      const Estimator::Result& estimate);
   static PulseModel pulse_model(const Estimator& estimator, const Snapshot<Estimator, cells>& now);
   static const model::PlausibleRange& plausible();
   static const protection::ProtectionPlan& plan();

@@ -4,6 +4,7 @@
 #include "hal/board_state.hpp"
 #include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
+#include "hal/group_bus.hpp"
 #include "hal/retained.hpp"
 #include "hal/samples.hpp"
 #include "hal/supply.hpp"
@@ -35,6 +36,22 @@ bms::hal::CanSettings can_settings() {
             id(Parameter::can_stop)};
   }
   return bms::hal::can_settings_of_build;
+}
+
+/// On both buses. Each battery of a group has identifiers of its own on the one of the truck.
+template <class Board>
+void start_buses() {
+  using namespace bms;
+  if constexpr (hal::has_group_bus) {
+    hal::CanSettings settings = can_settings<Board>();
+    const std::int32_t node = at(Board::parameters().active(), parameters::Parameter::group_node);
+    settings.base = static_cast<std::uint16_t>(parameters::base_of(settings.base, node));
+    hal::can_start(settings);
+    hal::group_can_start();
+  } else {
+    hal::can_start(can_settings<Board>());
+    if constexpr (hal::has_charger_bus) hal::charger_can_start();
+  }
 }
 
 template <class Board>
@@ -69,8 +86,7 @@ int main() {
   // may erase, up to half a second per sector; so it comes before anything that must answer in time
   persistence.start(hal::reset_cause(), hal::last_fault(), hal::calendar_s(), hal::retained_ram());
   hal::calibrate(start_parameters<BoardCell>(persistence));
-  hal::can_start(can_settings<BoardCell>());
-  if constexpr (hal::has_charger_bus) hal::charger_can_start();
+  start_buses<BoardCell>();
   start_updates<BoardCell>(persistence);
   const auto* sample = hal::next_sample();
   if (sample == nullptr) return 0;

@@ -19,6 +19,7 @@ set(BMS_CAN bxcan)
 set(BMS_CAN_BIT_RATE 250000)  # another one: -DBMS_CAN_BIT_RATE=500000
 set(BMS_CHARGER_BUS can1)  # can2: a bus of its own for the charger, with BMS_CHARGER_BIT_RATE (README.md, pins)
 set(BMS_CHARGER_BIT_RATE 250000)
+set(BMS_PARALLEL OFF)  # ON: one of two to four batteries, CAN2 is the bus between them (firmware/parallel/)
 set(BMS_PARAMETERS true)
 set(BMS_SAMPLES bq76952)
 set(BMS_AUXILIARY_CONTACTS stm32f4)  # absent: a truck whose main contactors have none

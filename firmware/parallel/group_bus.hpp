@@ -80,7 +80,7 @@ class GroupBus {
                 can::parallel::BatteryLimits4::data_id == can::parallel::BatteryLimits4::id);
 
   static constexpr float rounded_down_a(std::int32_t ua) {
-    return 0.1F * static_cast<float>(std::clamp(ua, 0, std::int32_t{2'147'000'000}) / 100'000);
+    return 0.1F * static_cast<float>(std::clamp<std::int32_t>(ua, 0, 2'147'000'000) / 100'000);
   }
   static constexpr std::int32_t in_micro(float value) { return static_cast<std::int32_t>(1e6F * value); }
 

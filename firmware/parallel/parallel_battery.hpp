@@ -21,6 +21,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 
 namespace bms::parallel {
 
@@ -46,6 +47,7 @@ struct Presence {
 struct Design {
   std::uint8_t node = 1, batteries = 2;  ///< nodes 1 to `batteries`
   std::int32_t connect_difference_uv = 500'000;
+  std::int32_t rest_ua = 0;  ///< below it no current flows in a battery, so how they share it is not known
 };
 
 struct Decision {
@@ -54,6 +56,7 @@ struct Decision {
   bool may_close = false;     ///< precharge and close, or stay closed
   bool must_open = false;     ///< in an orderly way, within a second
   bool leaderless = false;    ///< nothing has arrived from a leader for leave_us
+  bool complete = false;      ///< a Presence of every battery of the group arrives, and of no other one
   std::size_t connected = 0;  ///< batteries, as far as they are present
   std::int64_t total_ua = 0;  ///< their current: that of the truck or charger
   /// Of the whole group, for truck and charger; of a leader.
@@ -71,9 +74,9 @@ class GroupLimit {
     std::int64_t carried_ua = 0, allowed_ua = 0;  ///< of one battery; a current in the other direction is below 0
   };
 
-  /// connected: of them. changed: others than in the last call are connected.
+  /// connected: of them. changed: others than in the last call are connected. rest_ua: of one battery, as in Design.
   constexpr void update(const std::array<Use, most_batteries>& use, std::size_t connected, bool changed,
-                        std::uint32_t step_us) {
+                        std::int32_t rest_ua, std::uint32_t step_us) {
     std::int64_t total_ua = 0, sum_ua = 0, weakest_ua = INT32_MAX;
     for (std::size_t k = 0; k < connected; ++k) {
       total_ua += use[k].carried_ua;
@@ -81,13 +84,20 @@ class GroupLimit {
       weakest_ua = std::min(weakest_ua, use[k].allowed_ua);
     }
     if (connected == 0) weakest_ua = 0;
+    const std::int64_t before_ua = std::exchange(weakest_ua_, weakest_ua);
     if (connected < 2 || weakest_ua == 0) {
       limit_ua_ = weakest_ua;
       return;
     }
-    if (changed) limit_ua_ = std::min(limit_ua_ > 0 ? limit_ua_ : INT32_MAX, start_ua(connected, weakest_ua));
-    std::int64_t target_ua = std::max(limit_ua_, start_ua(connected, weakest_ua) / 2);
-    if (5 * total_ua >= limit_ua_ && total_ua > 0) {  // enough current to see how they share it
+    const std::int64_t start = start_ua(connected, weakest_ua);
+    // The limits of a battery that has just closed rise from 0 within seconds: what the group begins with follows them.
+    if (changed || before_ua == 0)
+      limit_ua_ = std::min(limit_ua_ > 0 ? limit_ua_ : INT32_MAX, start);
+    else if (weakest_ua > before_ua)
+      limit_ua_ = std::max(limit_ua_, std::min(limit_ua_ * weakest_ua / before_ua, start));
+    std::int64_t target_ua = std::max(limit_ua_, start / 2);
+    if (5 * total_ua >= limit_ua_ &&
+        total_ua > static_cast<std::int64_t>(connected) * rest_ua) {  // enough current to see how they share it
       target_ua = sum_ua;
       for (std::size_t k = 0; k < connected; ++k) {
         if (use[k].carried_ua > 0)
@@ -106,7 +116,7 @@ class GroupLimit {
     return share_start * static_cast<std::int64_t>(connected) * weakest_ua / 100;
   }
 
-  std::int64_t limit_ua_ = 0;
+  std::int64_t limit_ua_ = 0, weakest_ua_ = 0;
 };
 
 class ParallelBattery {
@@ -117,10 +127,11 @@ class ParallelBattery {
 
   constexpr explicit ParallelBattery(const Design& design) : design_(design) {}
 
-  /// A Presence of another battery. Of its own node, which another battery must have by mistake, nothing may close.
+  /// A Presence of another battery. Of its own node, or of one outside of the group, which a battery must have by
+  /// mistake, nothing may close.
   constexpr void receive(const Presence& from, std::uint64_t time_us) {
-    if (from.node == 0 || from.node > design_.batteries) return;
-    if (from.node == design_.node) {
+    if (from.node == 0) return;
+    if (from.node == design_.node || from.node > design_.batteries) {
       twin_us_ = time_us;
       twin_ = true;
       return;
@@ -138,6 +149,7 @@ class ParallelBattery {
     own.node = design_.node;
     peers_[design_.node - 1U] = {own, time_us, true};
     elect(own);
+    decision_.complete = complete();
     decision_.leads = decision_.leader == design_.node;
     own.leader = decision_.leader;
     own.granted = decision_.leads ? grant(request) : std::uint8_t{0};
@@ -181,7 +193,7 @@ class ParallelBattery {
     // a leader that itself follows another one does not count
     const bool led = decision_.leader != 0 && (decision_.leader == design_.node ||
                                                peers_[decision_.leader - 1U].last.leader == decision_.leader);
-    if (led) led_us_ = time_us_;
+    if (led) led_us_ = peers_[decision_.leader - 1U].time_us;
   }
 
   constexpr std::int32_t difference_uv(std::size_t a, std::size_t b) const {
@@ -246,8 +258,8 @@ class ParallelBattery {
       charge[connected++] = {p.current_ua, p.allowed_charge_ua};
       which = static_cast<std::uint8_t>(which | 1U << k);
     }
-    discharge_.update(discharge, connected, which != connected_, step_us);
-    charge_.update(charge, connected, which != connected_, step_us);
+    discharge_.update(discharge, connected, which != connected_, design_.rest_ua, step_us);
+    charge_.update(charge, connected, which != connected_, design_.rest_ua, step_us);
     connected_ = which;
     decision_.connected = connected;
     decision_.group_discharge_ua = decision_.leads ? discharge_.limit_ua() : 0;

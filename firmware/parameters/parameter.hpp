@@ -22,6 +22,11 @@
 //   18 canopen_charger       node          the build's: only shown                             of the bus
 //   19 inputs_fitted         bits          those that the board has: 1 auxiliary contacts, 2 second current sensor,
 //                                          4 key, 8 charger plug, 16 coil supply, 32 interlock, 64 crash sensor
+//   20 group_node            node          1 to group_batteries; 0: not set, nothing closes    of the group
+//   21 group_batteries       number        1 to 4, at one DC link; 0: not set                  of the group
+//
+// The last two are those of an image for one of several batteries (BMS_PARALLEL); others do not have them. A battery
+// of a group sends and receives at can_base + 0x40 (group_node - 1) on the truck's bus.
 //
 // The initial values are those of the build. `tightened_plan.hpp` says what the limits do, and proves at compile time
 // that every corner of their ranges gives a consistent table. Those of the bus are used from the next start on.
@@ -32,6 +37,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "protection/faults.hpp"
 #include "protection/pack_design.hpp"
 
 namespace bms::parameters {
@@ -55,9 +61,11 @@ enum class Parameter : std::uint8_t {
   can_stop,
   canopen_node,
   canopen_charger,
-  inputs_fitted
+  inputs_fitted,
+  group_node,
+  group_batteries
 };
-inline constexpr std::size_t parameter_count = 19;
+inline constexpr std::size_t parameter_count = protection::with_group ? 21 : 19;
 
 /// Those of a truck begin with first_truck_input, in the order of hal::TruckInput.
 inline constexpr std::int32_t auxiliary_contacts_fitted = 1, second_current_fitted = 2, first_truck_input = 4;
@@ -82,7 +90,9 @@ struct BuildDefaults {
   std::int32_t shunt_nohm = 100'000, inputs_fitted = 0;
 };
 
-inline constexpr std::int32_t base_step = 0x40;  ///< identifiers from the base on, of the battery's own messages
+inline constexpr std::int32_t most_batteries = 4;  ///< of a group
+inline constexpr std::int32_t base_step = 0x40;    ///< identifiers from the base on, of the battery's own messages
+inline constexpr std::int32_t last_base = 0x7C0;
 
 /// Ranges for a pack. Limits that are no multiples of the unit are rounded to the safe side.
 constexpr Ranges ranges_of(const protection::PackDesign& d, const BuildDefaults& build) {
@@ -103,25 +113,30 @@ constexpr Ranges ranges_of(const protection::PackDesign& d, const BuildDefaults&
   const double closing_mv = 1e3 * d.closing_current_max_a * d.closing_loop_ohm;
   const auto fixed = [](std::int32_t initial) { return Range{initial, initial, initial}; };
   const std::int32_t sample_ms = down(1e3 * d.sample_period_s + 0.5);
-  return {tightened_down(1e3 * l.voltage_max_v, 1e3 * (l.voltage_max_v - 0.2 * span_v)),
-          tightened_up(1e3 * l.voltage_min_v, 1e3 * (l.voltage_min_v + 0.4 * span_v)),
-          tightened_down(10 * l.charge_current_max_a, l.charge_current_max_a),
-          tightened_down(10 * l.discharge_current_max_a, l.discharge_current_max_a),
-          tightened_down(10 * l.temperature_max_c, 10 * (l.temperature_max_c - 15)),
-          tightened_up(10 * l.temperature_min_c, 10 * std::min(l.temperature_min_c + 20, freezing_c)),
-          tightened_up(10 * freezing_c, 10 * (freezing_c + 10)),
-          Range{500, 10'000, 10'000},
-          Range{1'000, 5'000, 5'000},
-          tightened_down(10 * d.capacity_ah, 5 * d.capacity_ah),
-          Range{build.shunt_nohm / 20 * 19, build.shunt_nohm / 20 * 21, build.shunt_nohm},
-          Range{2 * sample_ms, 4'000, down(1e3 * d.precharge_time_constant_s + 0.5)},
-          tightened_down(closing_mv, closing_mv / 4),
-          Range{125, 1'000, build.bit_rate_kbit_s},
-          Range{0x100, 0x7C0, build.can_base},
-          Range{1, 0x7FF, build.can_stop},
-          fixed(build.canopen_node),
-          fixed(build.canopen_charger),
-          Range{0, build.inputs_fitted, build.inputs_fitted}};
+  std::array<Range, 21> all{tightened_down(1e3 * l.voltage_max_v, 1e3 * (l.voltage_max_v - 0.2 * span_v)),
+                            tightened_up(1e3 * l.voltage_min_v, 1e3 * (l.voltage_min_v + 0.4 * span_v)),
+                            tightened_down(10 * l.charge_current_max_a, l.charge_current_max_a),
+                            tightened_down(10 * l.discharge_current_max_a, l.discharge_current_max_a),
+                            tightened_down(10 * l.temperature_max_c, 10 * (l.temperature_max_c - 15)),
+                            tightened_up(10 * l.temperature_min_c, 10 * std::min(l.temperature_min_c + 20, freezing_c)),
+                            tightened_up(10 * freezing_c, 10 * (freezing_c + 10)),
+                            Range{500, 10'000, 10'000},
+                            Range{1'000, 5'000, 5'000},
+                            tightened_down(10 * d.capacity_ah, 5 * d.capacity_ah),
+                            Range{build.shunt_nohm / 20 * 19, build.shunt_nohm / 20 * 21, build.shunt_nohm},
+                            Range{2 * sample_ms, 4'000, down(1e3 * d.precharge_time_constant_s + 0.5)},
+                            tightened_down(closing_mv, closing_mv / 4),
+                            Range{125, 1'000, build.bit_rate_kbit_s},
+                            Range{0x100, last_base, build.can_base},
+                            Range{1, 0x7FF, build.can_stop},
+                            fixed(build.canopen_node),
+                            fixed(build.canopen_charger),
+                            Range{0, build.inputs_fitted, build.inputs_fitted},
+                            Range{0, most_batteries, 0},
+                            Range{0, most_batteries, 0}};
+  Ranges ranges{};
+  std::copy_n(all.begin(), ranges.size(), ranges.begin());
+  return ranges;
 }
 
 constexpr Values initial_values(const Ranges& ranges) {
@@ -143,6 +158,11 @@ constexpr bool possible(Parameter p, std::int32_t value, const Ranges& ranges) {
 /// Identifiers of the update of the firmware (firmware/boot/update_server.hpp), which do not move.
 inline constexpr std::int32_t update_request = 0x7B0, update_response = 0x7B8;
 
+/// What the messages of a node of a group begin with. node: 1 to most_batteries; 0: not set, as 1.
+constexpr std::int32_t base_of(std::int32_t can_base, std::int32_t node) {
+  return can_base + base_step * std::max(node - 1, std::int32_t{0});
+}
+
 /// Returns true if no two messages of the battery have the same identifier, and Stop wins the arbitration. 0x300 to
 /// 0x33F are those of samples (hal/sample_frames.hpp); the others are those of a CANopen node
 /// (firmware/cia418_profile.hpp) and of the update.
@@ -157,16 +177,44 @@ constexpr bool identifiers_are_unique(const Values& values) {
   return std::ranges::none_of(of_others, [&](std::int32_t id) { return id == stop || own(id); });
 }
 
-/// Bit rate and identifiers of a possible set in one word: 4 bits of 125 kbit/s, 5 bits of base_step, 11 bits of Stop.
+/// Returns true if the group is not set, or the node is one of it, and all of its batteries have identifiers of their
+/// own.
+constexpr bool possible_group(const Values& values) {
+  const std::int32_t node = at(values, Parameter::group_node), batteries = at(values, Parameter::group_batteries);
+  if (node > batteries || (node == 0) != (batteries == 0)) return false;
+  for (std::int32_t k = 1; k <= std::max(batteries, std::int32_t{1}); ++k) {
+    Values of_node = values;
+    at(of_node, Parameter::can_base) = base_of(at(values, Parameter::can_base), k);
+    if (at(of_node, Parameter::can_base) > last_base || !identifiers_are_unique(of_node)) return false;
+  }
+  return true;
+}
+/// What several values must be together.
+[[gnu::always_inline]] constexpr bool possible_together(const Values& values) {
+  if constexpr (protection::with_group)
+    return possible_group(values);
+  else
+    return identifiers_are_unique(values);
+}
+
+/// Bit rate and identifiers of a possible set in one word: 4 bits of 125 kbit/s, 5 bits of base_step, 11 bits of Stop;
+/// in a group three bits each of node and number.
 constexpr std::int32_t bus_setting(const Values& values) {
-  return at(values, Parameter::can_bit_rate) / 125 | at(values, Parameter::can_base) / base_step << 4 |
-         at(values, Parameter::can_stop) << 9;
+  std::int32_t word = at(values, Parameter::can_bit_rate) / 125 | at(values, Parameter::can_base) / base_step << 4 |
+                      at(values, Parameter::can_stop) << 9;
+  if constexpr (protection::with_group)
+    word |= at(values, Parameter::group_node) << 20 | at(values, Parameter::group_batteries) << 23;
+  return word;
 }
 /// The values may be impossible ones if the word is not of bus_setting().
 constexpr void set_bus(Values& values, std::int32_t setting) {
   at(values, Parameter::can_bit_rate) = 125 * (setting & 0xF);
   at(values, Parameter::can_base) = base_step * (setting >> 4 & 0x1F);
   at(values, Parameter::can_stop) = setting >> 9 & 0x7FF;
+  if constexpr (protection::with_group) {
+    at(values, Parameter::group_node) = setting >> 20 & 7;
+    at(values, Parameter::group_batteries) = setting >> 23 & 7;
+  }
 }
 
 /// Returns true if all values are possible, also together.
@@ -174,7 +222,7 @@ constexpr bool possible(const Values& values, const Ranges& ranges) {
   for (std::size_t k = 0; k < parameter_count; ++k) {
     if (!possible(static_cast<Parameter>(k + 1), values[k], ranges)) return false;
   }
-  return identifiers_are_unique(values);
+  return possible_together(values);
 }
 
 }  // namespace bms::parameters

@@ -149,10 +149,13 @@ class ParameterBlock {
       if (!possible(parameter, values[k], *ranges_)) values[k] = (*ranges_)[k].initial;
       if (values[k] != value) state_ = BlockState::clamped;
     }
-    if (!identifiers_are_unique(values)) {
+    if (!possible_together(values)) {
       for (const Parameter p :
            {Parameter::can_base, Parameter::can_stop, Parameter::canopen_node, Parameter::canopen_charger})
         at(values, p) = at(*ranges_, p).initial;
+      if constexpr (protection::with_group) {
+        for (const Parameter p : {Parameter::group_node, Parameter::group_batteries}) at(values, p) = 0;
+      }
       state_ = BlockState::clamped;
     }
     active_ = values;

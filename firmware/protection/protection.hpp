@@ -25,6 +25,7 @@
 #include "protection/derating.hpp"
 #include "protection/excess_charge.hpp"
 #include "protection/fault_monitor.hpp"
+#include "protection/inputs.hpp"
 #include "protection/pack_quantities.hpp"
 #include "protection/table.hpp"
 
@@ -64,40 +65,6 @@ constexpr ProtectionPlan protection_plan(const PackDesign& design) {
           .start_us = in_us(design.start_s),
           .recovery_ua = in_micro(design.recovery_c_rate * design.capacity_ah)};
 }
-
-/// Estimates that go with a sample; measurement::no_reading: unknown.
-template <std::size_t Cells>
-struct PackEstimate {
-  std::int32_t soc_ppb = measurement::no_reading, soc_sigma_ppb = 0;  ///< of the mean cell, 1e-9
-  std::int32_t model_charge_ua = measurement::no_reading,
-               model_discharge_ua = measurement::no_reading;  ///< state of function, both >= 0
-  bool voltage_rejected = false;                              ///< Flag::voltage_rejected
-  /// soc of each cell minus the mean, 1e-9.
-  std::array<std::int32_t, Cells> cell_soc_ppb = measurement::PackSample<Cells>{}.cell_uv;
-  std::array<std::int32_t, Cells> cell_sigma_ppb{};
-};
-
-/// Requests and commands from the bus, and results of the board's self-tests.
-struct ExternalInputs {
-  Request request = Request::none;
-  Clear clear = Clear::none;  ///< as long as the key is pressed
-  /// L+ and L-, the load side of the contactors, against the negative end of the cells.
-  std::int32_t link_plus_uv = measurement::no_reading, link_minus_uv = measurement::no_reading;
-  AuxiliaryContacts auxiliary = {};
-  bool contact_lost = false;  ///< a main contact has opened by itself, perhaps only for a moment
-  bool board_fault = false;   ///< failed self-test; with the first sample, a watchdog reset
-  bool storage_fault = false;
-  bool supply_dip = false;        ///< the supply of the controller has fallen, perhaps only for a moment
-  std::uint32_t second_line = 0;  ///< trips of the front end: measurement::SecondLineTrip
-  std::int16_t front_end_cdegc = measurement::no_temperature;  ///< of its die, 0.01 degrees C
-  bool second_current_fitted = false;
-  std::int32_t second_current_ua = measurement::no_reading;
-  // Of the truck; an input that is not fitted stays at its initial value.
-  bool coils_dead = false;  ///< the coils have no supply, or had none for a moment: a state, and no fault
-  bool interlock_open = false, crashed = false;
-  bool insulation_monitored = false;
-  std::int32_t insulation_ohm = measurement::no_reading;  ///< between battery and frame
-};
 
 struct Decision {
   FaultSet faults = 0, raised = 0;  ///< active, and raised by this step
@@ -273,6 +240,7 @@ class Protection {
     at(q, Quantity::insulation_missing) =
         inputs.insulation_monitored && inputs.insulation_ohm == measurement::no_reading;
     at(q, Quantity::insulation_ohm) = inputs.insulation_ohm;
+    if constexpr (with_group) at(q, Quantity::batteries_missing) = group_incomplete(inputs);
   }
 
   /// Trips since the last call. A short circuit counts as the largest current, because it may be over before a reading.

@@ -50,8 +50,9 @@ enum class Quantity : std::uint8_t {
   insulation_missing,  ///< a monitor is fitted and has no reading
   insulation_ohm,      ///< between battery and frame
   front_end_cdegc,     ///< die of the measuring chip
+  batteries_missing,   ///< 0 or 1: nothing arrives from a battery of the group
 };
-inline constexpr std::size_t quantity_count = 40;
+inline constexpr std::size_t quantity_count = with_group ? 41 : 40;
 
 enum class Sense : std::uint8_t { above, below };
 

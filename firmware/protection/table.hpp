@@ -63,7 +63,7 @@ constexpr Row row(const Protected& p) {
           .why = p.why};
 }
 
-using Table = std::array<Row, fault_count>;
+using Table = std::array<Row, known_faults>;  ///< the first fault_count act
 using Rules = std::array<Rule, fault_count>;
 
 constexpr Table protection_table(const PackDesign& d) {
@@ -350,6 +350,11 @@ constexpr Table protection_table(const PackDesign& d) {
            .released = {.threshold = in_centi(85), .after_s = 60, .recovery = automatic},
            .reaction = open,
            .why = "a die warms up in minutes; at 110 °C the measuring chip shuts down and opens main plus under load"}),
+      row({.fault = group_incomplete,
+           .raised = {.quantity = batteries_missing, .sense = above, .threshold = 0, .delay_s = 1},
+           .released = {.threshold = 0, .after_s = 5, .recovery = automatic},
+           .reaction = warn,
+           .why = "three lost messages count as missing; the battery without a leader opens after the same time"}),
   }};
 }
 

@@ -93,6 +93,8 @@ constexpr QuantityText text_of_event(Quantity q) {
       return {"insulation monitor without a reading"};
     case Quantity::insulation_ohm:
       return {"insulation between battery and frame", "kohm", 1e3, 2};
+    case Quantity::batteries_missing:
+      return {"nothing arrives from a battery of the group, or no group is set"};
     default:
       return {};
   }

@@ -19,6 +19,7 @@
 #include "hal/clock.hpp"
 #include "hal/contactor_pins.hpp"
 #include "hal/frame_dispatch.hpp"
+#include "hal/group_bus.hpp"
 #include "hal/i2c.hpp"
 #include "hal/power.hpp"
 #include "hal/power_path.hpp"
@@ -80,6 +81,7 @@ bool started = false;
 
 void receive_frames() {
   charger_bus_service();
+  group_bus_service();
   can::Frame frame;
   while (can_receive(frame)) dispatch_frame(frame);
 }

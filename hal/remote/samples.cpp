@@ -11,6 +11,7 @@
 #include "hal/charger_bus.hpp"
 #include "hal/clock.hpp"
 #include "hal/frame_dispatch.hpp"
+#include "hal/group_bus.hpp"
 #include "hal/power_path.hpp"
 #include "hal/sample_frames.hpp"
 #include "hal/update_frames.hpp"
@@ -33,6 +34,7 @@ bool silent = false;                                     ///< the last sample ha
 const measurement::PackSample<pack_cells>* next_sample() {
   while (true) {
     charger_bus_service();
+    group_bus_service();
     can::Frame frame;
     while (can_receive(frame)) {
       if (!dispatch_frame(frame) || !frames.receive(frame))

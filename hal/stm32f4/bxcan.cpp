@@ -1,7 +1,7 @@
 // CAN1 on PB8 (RX) and PB9 (TX), alternate function 9 (datasheet, table 9). Registers: RM0090, 32.9.
 //
-// An image with two buses has this file twice: with BMS_CHARGER_BUS it is CAN2 on PB12 (RX) and PB13 (TX), and the
-// functions are those of hal/charger_bus.hpp. Nothing is common but the filters.
+// An image with two buses has this file twice: with BMS_CHARGER_BUS or BMS_GROUP_BUS it is CAN2 on PB12 (RX) and PB13
+// (TX), and the functions are those of hal/charger_bus.hpp or hal/group_bus.hpp. Nothing is common but the filters.
 //
 // Transmission: three mailboxes, which the controller sends by identifier (TXFP = 0), and a queue of 32 frames in the
 // same order. If a more urgent frame finds all mailboxes taken, the least urgent one is aborted and returns to the
@@ -167,7 +167,7 @@ void enter(Phase next) {
 
 /// Of two buses those of this one, and once: FINIT stops the reception of both.
 void set_filters() {
-  if (has_charger_bus && std::exchange(filters_set, true)) return;
+  if (has_second_bus && std::exchange(filters_set, true)) return;
   can_fmr() = can_fmr() | 1U;
   const auto accepted = ids_of_bus();
   std::array<std::uint16_t, bxcan::max_ids> on_the_bus;

@@ -1,7 +1,7 @@
-// The controller that bxcan.cpp drives (RM0090, 32.9): CAN1, the bus of the truck; with BMS_CHARGER_BUS CAN2, the bus
-// of the charger, which needs the clock of CAN1 as well. The filters of both are banks of CAN1: 0 to 13 are those of
-// CAN1 and 14 to 27 those of CAN2 as long as nobody changes CAN2SB (32.9.4, CAN_FMR). While FINIT is set neither
-// receives.
+// The controller that bxcan.cpp drives (RM0090, 32.9): CAN1, the bus of the truck; with BMS_CHARGER_BUS or
+// BMS_GROUP_BUS CAN2, the bus of the charger or the one between batteries, which needs the clock of CAN1 as well. The
+// filters of both are banks of CAN1: 0 to 13 are those of CAN1 and 14 to 27 those of CAN2 as long as nobody changes
+// CAN2SB (32.9.4, CAN_FMR). While FINIT is set neither receives.
 #pragma once
 
 #include <algorithm>
@@ -15,6 +15,7 @@
 #include "hal/bxcan/filter_banks.hpp"
 #include "hal/can.hpp"
 #include "hal/charger_bus.hpp"
+#include "hal/group_bus.hpp"
 #include "hal/stm32f4/clock_tree.hpp"
 #include "hal/stm32f4/registers.hpp"
 #include "hal/update_frames.hpp"
@@ -22,17 +23,26 @@
 namespace bms::hal::stm32f4 {
 
 // A namespace for each: the linker keeps one of two inline definitions with the same name.
+#if defined BMS_CHARGER_BUS || defined BMS_GROUP_BUS
 #ifdef BMS_CHARGER_BUS
 inline namespace charger_bus {
 #define BMS_OF_BUS(function) charger_##function
+inline constexpr CanSettings settings_of_bus = charger_bus_settings;
+inline constexpr auto long_ids_of_bus = charger_bus_long_ids;
+inline std::span<const std::uint16_t> ids_of_bus() { return charger_bus_ids; }
+#else
+inline namespace group_bus {
+#define BMS_OF_BUS(function) group_##function
+inline constexpr CanSettings settings_of_bus = group_bus_settings;
+inline constexpr std::array<LongId, 0> long_ids_of_bus{};
+inline std::span<const std::uint16_t> ids_of_bus() { return group_bus_ids; }
+#endif
 #define BMS_INTERRUPT_OF_BUS(interrupt) can2_##interrupt
 inline constexpr std::uint32_t can_controller = 0x40006800, can_clocks = 3U << 25, first_bank = 14;
 inline constexpr std::uint32_t first_pin = 12;  // PB12 (RX) and PB13 (TX)
 inline constexpr unsigned tx_interrupt = can2_tx_interrupt, rx0_interrupt = can2_rx0_interrupt;
-inline constexpr std::size_t queue_frames = 8, ring_frames = 16;  // a profile sends four frames in a sample
-inline constexpr CanSettings settings_of_bus = charger_bus_settings;
-inline constexpr auto long_ids_of_bus = charger_bus_long_ids;
-inline std::span<const std::uint16_t> ids_of_bus() { return charger_bus_ids; }
+// A profile sends four frames in a sample, a battery two; three others send six in that time.
+inline constexpr std::size_t queue_frames = 8, ring_frames = 16;
 /// No identifier is moved: none is one of the battery's own messages.
 struct IdentifiersOfBus {
   constexpr explicit IdentifiersOfBus(const CanSettings&) {}
@@ -60,6 +70,7 @@ static_assert(bxcan::fits(with_updates(request_ids), long_ids.size()) &&
                   bxcan::fits(with_updates(request_and_sample_ids), long_ids.size()),
               "too many identifiers for the acceptance filters of CAN1");
 static_assert(bxcan::bank_count(charger_bus_ids) + charger_bus_long_ids.size() <= bxcan::max_banks);
+static_assert(bxcan::bank_count(group_bus_ids) <= bxcan::max_banks);
 
 struct Rate {
   std::uint32_t bit_rate, btr, phase_timeout_us;
@@ -71,8 +82,8 @@ consteval Rate rate(std::uint32_t bit_rate) {
           std::max<std::uint32_t>(100'000, recovery_us + margin_us)};
 }
 /// That of the build first: it is used if the settings have another one that is not here. No parameter sets the bit
-/// rate of the charger's own bus.
-#ifdef BMS_CHARGER_BUS
+/// rate of the second bus.
+#if defined BMS_CHARGER_BUS || defined BMS_GROUP_BUS
 inline constexpr std::array rates{rate(settings_of_bus.bit_rate)};
 #else
 inline constexpr std::array rates{rate(settings_of_bus.bit_rate), rate(125'000), rate(250'000), rate(500'000),
@@ -116,7 +127,7 @@ inline CanFilterBank& can_filter_bank(std::uint32_t k) { return reinterpret_cast
 
 /// Bits of this bus in a register of both; the only ones that an image with one bus has.
 inline void set_own_banks(Register& both, std::uint32_t own) {
-  if constexpr (has_charger_bus)
+  if constexpr (has_second_bus)
     both = (both & ~banks_of_bus) | own << first_bank;
   else
     both = own;
@@ -140,5 +151,5 @@ inline void enable_interrupts() {
   }
 }
 
-}  // namespace charger_bus or truck_bus
+}  // namespace charger_bus, group_bus or truck_bus
 }  // namespace bms::hal::stm32f4

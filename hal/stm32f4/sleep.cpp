@@ -128,7 +128,7 @@ std::uint64_t stop() {
   return stopped_us;
 }
 
-constexpr std::uint32_t listen_pin = has_charger_bus ? 0 : 12;  // of port B
+constexpr std::uint32_t listen_pin = has_second_bus ? 0 : 12;  // of port B
 constexpr std::uint32_t only_listens = 1U << listen_pin;
 constexpr std::uint32_t charger_line = 1U << 12;  // EXTI12: PB12
 constexpr std::uint32_t contacts_interrupt = 1U << (exti15_10_interrupt - 32);

@@ -1,6 +1,6 @@
 #include "hal/cortex_m/vectors.hpp"
 
-#include "board_config.hpp"  // generated from boards/<board>/board.cmake: has_charger_bus
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake: has_second_bus
 #include "hal/stm32f4/registers.hpp"
 
 extern "C" {
@@ -45,7 +45,7 @@ constexpr auto table() {
   all.serve(cortex_m::core_exceptions + stm32f4::usart1_interrupt, ::usart1_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_tx_interrupt, ::can1_tx_interrupt);
   all.serve(cortex_m::core_exceptions + stm32f4::can1_rx0_interrupt, ::can1_rx0_interrupt);
-  if constexpr (has_charger_bus) {
+  if constexpr (has_second_bus) {
     all.serve(cortex_m::core_exceptions + stm32f4::can2_tx_interrupt, ::can2_tx_interrupt);
     all.serve(cortex_m::core_exceptions + stm32f4::can2_rx0_interrupt, ::can2_rx0_interrupt);
   }

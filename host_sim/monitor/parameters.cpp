@@ -32,7 +32,9 @@ const std::vector<ParameterName>& parameter_names() {
       {number(V::number_can_stop), "can_stop", "", 1, 0, true},
       {number(V::number_canopen_node), "canopen_node", "", 1, 0},
       {number(V::number_canopen_charger), "canopen_charger", "", 1, 0},
-      {number(V::number_inputs_fitted), "inputs_fitted", "", 1, 0}};
+      {number(V::number_inputs_fitted), "inputs_fitted", "", 1, 0},
+      {number(V::number_group_node), "group_node", "", 1, 0},
+      {number(V::number_group_batteries), "group_batteries", "", 1, 0}};
   return names;
 }
 

@@ -257,12 +257,12 @@ TEST_F(ParametersTest, EveryValueBeyondItsRangeIsRefusedAndDiscardsTheSet) {
     }
   }
   for (const auto& [p, value] : {std::pair{Parameter::can_bit_rate, 300}, std::pair{Parameter::can_base, 0x190},
-                                 std::pair{static_cast<Parameter>(20), 1}}) {
+                                 std::pair{static_cast<Parameter>(22), 1}}) {
     begin(board);
     EXPECT_EQ(set(board, p, value), Answer::result_refused) << static_cast<int>(p);
     ++refused;
   }
-  EXPECT_EQ(refused, 79);
+  EXPECT_EQ(refused, 87);
   // each possible, but not together: two messages with one identifier
   for (const auto& [p, value] : {std::pair{Parameter::can_stop, 0x1A0}, std::pair{Parameter::can_base, 0x300},
                                  std::pair{Parameter::can_base, 0x700}, std::pair{Parameter::can_base, 0x780}}) {
@@ -276,6 +276,35 @@ TEST_F(ParametersTest, EveryValueBeyondItsRangeIsRefusedAndDiscardsTheSet) {
   EXPECT_EQ(apply(board, with({{Parameter::cell_voltage_max, 3'450}})), Answer::result_refused) << "discarded";
   EXPECT_EQ(active(), before);
   EXPECT_EQ(ParameterCell::parameters().revision(), 0);
+}
+
+/// Node and number of a battery in a group, and identifiers for each of them: 0x20A is one of a CANopen charger.
+TEST(GroupParameters, ArePossibleOnlyTogether) {
+  const auto possible = [](std::int32_t node, std::int32_t batteries, std::int32_t base = 0x180) {
+    parameters::Values values = initial_values(ranges());
+    at(values, Parameter::group_node) = node;
+    at(values, Parameter::group_batteries) = batteries;
+    at(values, Parameter::can_base) = base;
+    return parameters::possible(values, ranges());
+  };
+  EXPECT_TRUE(possible(0, 0)) << "not set";
+  EXPECT_TRUE(possible(1, 1)) << "alone";
+  EXPECT_TRUE(possible(1, 2) && possible(2, 2));
+  EXPECT_FALSE(possible(0, 2) || possible(1, 0) || possible(3, 2) || possible(5, 5) || possible(-1, 2));
+  EXPECT_FALSE(possible(1, 3)) << "of node 3";
+  for (std::int32_t node = 1; node <= 4; ++node) EXPECT_TRUE(possible(node, 4, 0x100)) << node;
+  EXPECT_FALSE(possible(1, 3, 0x780)) << "beyond 11 bits";
+}
+
+TEST(GroupParameters, AreInTheSettingOfTheBus) {
+  for (const auto& [node, batteries] : {std::pair{0, 0}, std::pair{2, 2}, std::pair{4, 4}}) {
+    parameters::Values values = initial_values(ranges()), restored = values;
+    at(values, Parameter::group_node) = node;
+    at(values, Parameter::group_batteries) = batteries;
+    at(values, Parameter::can_stop) = 0x0A5;
+    parameters::set_bus(restored, parameters::bus_setting(values));
+    EXPECT_EQ(restored, values);
+  }
 }
 
 TEST_F(ParametersTest, AClosedContactorRefuses) {

@@ -100,6 +100,22 @@ void Truck::set_precharge_ohm(double ohm) {
   circuit_.set_resistance_ohm(contact(Relay::precharge), ohm);
 }
 
+void Truck::set_other_batteries(const LinkSource& source) {
+  circuit_.set_emf_v(network_.other_batteries, source.emf_v);
+  constexpr double same = 0.01;  // a new resistance discards the factors; within 1 % the old one will do
+  if (std::abs(source.siemens - others_.siemens) <= same * others_.siemens) return;
+  others_ = source;
+  circuit_.set_resistance_ohm(network_.other_batteries, source.siemens > 0 ? 1 / source.siemens : broken_ohm);
+}
+
+LinkSource Truck::link_source() const {
+  const bool plus = contact_closed(Relay::main_plus);
+  if (!contact_closed(Relay::main_minus) || !(plus || contact_closed(Relay::precharge))) return {};
+  const double to_plus_ohm = plus ? parameters_.main_contact_ohm : parameters_.precharge.ohm;
+  return {cells_.emf_v(), 1 / (cells_.resistance_ohm() + parameters_.fuse_ohm + parameters_.shunt_ohm + to_plus_ohm +
+                               parameters_.main_contact_ohm)};
+}
+
 void Truck::update_supplies(double duration_s) {
   const SupplyParameters& supply = parameters_.supply;
   double coils_a = 0;
@@ -142,7 +158,8 @@ void Truck::update_charger() {
 double Truck::step_limit_s(double rest_s) const {
   double limit_s = std::min({rest_s, next_edge_s(vdda_dips_, time_s()), next_edge_s(coil_dips_, time_s())});
   for (const Contactor& contactor : contactors_) limit_s = std::min(limit_s, contactor.next_change_s());
-  if (!contact_closed(Relay::main_plus) || !contact_closed(Relay::main_minus)) {
+  const bool fed = others_.siemens > 1;  // by another battery
+  if (!fed && (!contact_closed(Relay::main_plus) || !contact_closed(Relay::main_minus))) {
     const double drive_a = std::abs(circuit_.current_a(network_.drive_source));
     if (drive_a > 0) limit_s = std::min(limit_s, std::max(1e-5, 0.2 * parameters_.dc_link.capacitance_f / drive_a));
   }

@@ -43,6 +43,11 @@ struct ChargerDemand {
   double voltage_v = 58.4, current_a = 50;
 };
 
+/// A battery as the DC link sees it, by Thevenin.
+struct LinkSource {
+  double emf_v = 0, siemens = 0;  ///< 0 S: its contacts are open
+};
+
 struct SupplyDip {
   double start_s, duration_s, depth_v;
 };
@@ -84,6 +89,10 @@ class Truck {
   void set_pins(const ControllerPins& pins) { pins_ = pins; }
   void set_drive(const Drive& drive) { drive_ = drive; }
   void set_charger(const ChargerDemand& demand) { charger_ = demand; }
+  /// All other batteries at the DC link together. Needs TruckParameters::in_parallel.
+  void set_other_batteries(const LinkSource& source);
+  /// This battery, for the circuits of the others.
+  LinkSource link_source() const;
   void set_idle_w(double idle_w) { parameters_.dc_link.idle_w = idle_w; }
   void add_vdda_dip(const SupplyDip& dip) { vdda_dips_.push_back(dip); }
   void add_coil_supply_dip(const SupplyDip& dip) { coil_dips_.push_back(dip); }
@@ -133,6 +142,7 @@ class Truck {
   ControllerPins pins_;
   Drive drive_;
   ChargerDemand charger_;
+  LinkSource others_;
   std::vector<SupplyDip> vdda_dips_, coil_dips_;
   double vdda_v_, steady_coil_a_ = 0;
   double last_step_s_ = 0;

@@ -43,6 +43,8 @@ void build_truck(Circuit& circuit, TruckNetwork& n, const TruckParameters& p) {
     circuit.add(Branch{.from = n.l_plus, .to = n.l_minus, .resistance_ohm = p.dc_link.bleeder_ohm});
   }
   n.drive_source = circuit.add_current_source(n.l_plus, n.l_minus);
+  if (p.in_parallel)
+    n.other_batteries = circuit.add(Branch{.from = n.l_plus, .to = n.l_minus, .resistance_ohm = p.open_contact_ohm});
 }
 
 /// A current source, limited to a voltage, feeds the output capacitor through a diode.

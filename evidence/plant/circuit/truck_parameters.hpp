@@ -89,7 +89,8 @@ struct TruckParameters {
   SupplyParameters supply = {};
   std::array<HallParameters, 2> hall = {};
   FrameLeaks leaks = {};
-  std::uint64_t seed = 1;  ///< of the times of the contactors
+  bool in_parallel = false;  ///< other batteries at the DC link: Truck::set_other_batteries()
+  std::uint64_t seed = 1;    ///< of the times of the contactors
 };
 
 /// Typical values; the pre-charge relay is quicker than the contactors.

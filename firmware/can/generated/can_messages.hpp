@@ -1,5 +1,5 @@
 // Generated from greybox_bms.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: 88538ece5198f6285508d4bb924ffac4fe6c080e052d2f50eaeaf5aebb358487
+// SHA-256 of that file: 7dea2096f5325e4188ba4676036235d2b9eae716b62fdaa1253837e10fc73902
 #pragma once
 
 #include <array>
@@ -1354,7 +1354,7 @@ struct Faults {
   std::uint32_t internal_fault = 0;  ///< The firmware found an internal error, or the watchdog reset it.
   static constexpr SignalLayout storage_fault_layout = {47, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t storage_fault = 0;  ///< Records cannot be stored.
-  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 49.0F, true, 63};
+  static constexpr SignalLayout first_cause_layout = {48, 6, false, 1.0F, 0.0F, 0.0F, 50.0F, true, 63};
   std::uint32_t first_cause = 0;  ///< First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.
   static constexpr std::uint32_t first_cause_none = 0;
   static constexpr std::uint32_t first_cause_cell_overvoltage_warning = 1;
@@ -1406,6 +1406,7 @@ struct Faults {
   static constexpr std::uint32_t first_cause_insulation_low = 47;
   static constexpr std::uint32_t first_cause_insulation_unknown = 48;
   static constexpr std::uint32_t first_cause_front_end_hot = 49;
+  static constexpr std::uint32_t first_cause_group_incomplete = 50;
   static constexpr std::uint32_t first_cause_not_known = 63;
 
   constexpr can::Frame frame(std::uint8_t counter) const {
@@ -1555,7 +1556,7 @@ struct Faults {
     see("SamplesMissing", "No samples arrive.", std::span<const ValueName>());
     see("InternalFault", "The firmware found an internal error, or the watchdog reset it.", std::span<const ValueName>());
     see("StorageFault", "Records cannot be stored.", std::span<const ValueName>());
-    { static constexpr std::array<ValueName, 51> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{43, "thermistor shorted"}, ValueName{44, "second current missing"}, ValueName{45, "interlock open"}, ValueName{46, "crash"}, ValueName{47, "insulation low"}, ValueName{48, "insulation unknown"}, ValueName{49, "front end hot"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 52> names{{ValueName{0, "none"}, ValueName{1, "cell overvoltage warning"}, ValueName{2, "cell overvoltage"}, ValueName{3, "cell overvoltage severe"}, ValueName{4, "cell undervoltage warning"}, ValueName{5, "cell undervoltage"}, ValueName{6, "cell undervoltage severe"}, ValueName{7, "pack overvoltage"}, ValueName{8, "pack undervoltage"}, ValueName{9, "charge overcurrent"}, ValueName{10, "discharge overcurrent"}, ValueName{11, "short circuit"}, ValueName{12, "overtemperature warning"}, ValueName{13, "overtemperature"}, ValueName{14, "charge overtemperature"}, ValueName{15, "undertemperature"}, ValueName{16, "charge undertemperature"}, ValueName{17, "open wire"}, ValueName{18, "imbalance"}, ValueName{19, "current implausible"}, ValueName{20, "sum mismatch"}, ValueName{21, "voltage missing"}, ValueName{22, "voltage stuck"}, ValueName{23, "current missing"}, ValueName{24, "temperature lost"}, ValueName{25, "temperature stuck"}, ValueName{26, "deep discharge"}, ValueName{27, "precharge failed"}, ValueName{28, "contactor welded"}, ValueName{29, "contactor not closed"}, ValueName{30, "samples missing"}, ValueName{31, "internal fault"}, ValueName{32, "storage fault"}, ValueName{33, "second line tripped"}, ValueName{34, "second line failed"}, ValueName{35, "current sensors differ"}, ValueName{36, "temperature unknown"}, ValueName{37, "current unrequested"}, ValueName{38, "allowed current exceeded"}, ValueName{39, "charge limit exceeded"}, ValueName{40, "discharge limit exceeded"}, ValueName{41, "limit not obeyed"}, ValueName{42, "supply dip"}, ValueName{43, "thermistor shorted"}, ValueName{44, "second current missing"}, ValueName{45, "interlock open"}, ValueName{46, "crash"}, ValueName{47, "insulation low"}, ValueName{48, "insulation unknown"}, ValueName{49, "front end hot"}, ValueName{50, "group incomplete"}, ValueName{63, "not known"}}}; see("FirstCause", "First fault since the last clear: number of its bit in the table plus 1; from 33 on a fault of MoreFaults.", std::span<const ValueName>(names)); }
   }
 };
 
@@ -1599,6 +1600,8 @@ struct MoreFaults {
   std::uint32_t insulation_unknown = 0;  ///< The insulation monitor has given no value for a minute.
   static constexpr SignalLayout front_end_hot_layout = {32, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
   std::uint32_t front_end_hot = 0;  ///< The die of the measuring chip is above 95 degC. At 110 degC the chip would shut down and open under load, so the firmware opens before.
+  static constexpr SignalLayout group_incomplete_layout = {33, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t group_incomplete = 0;  ///< Nothing has arrived from a battery of the group at one DC link for a second, or no group is set: nothing closes (firmware/parallel/README.md). Only of an image for one of several batteries.
 
   constexpr can::Frame frame(std::uint8_t counter) const {
     can::Frame out{id, 8, {}, false};
@@ -1619,6 +1622,7 @@ struct MoreFaults {
     put<insulation_low_layout>(out, insulation_low);
     put<insulation_unknown_layout>(out, insulation_unknown);
     put<front_end_hot_layout>(out, front_end_hot);
+    put<group_incomplete_layout>(out, group_incomplete);
     protect(out, data_id, counter);
     return out;
   }
@@ -1641,6 +1645,7 @@ struct MoreFaults {
     out.insulation_low = get<insulation_low_layout, decltype(out.insulation_low)>(frame);
     out.insulation_unknown = get<insulation_unknown_layout, decltype(out.insulation_unknown)>(frame);
     out.front_end_hot = get<front_end_hot_layout, decltype(out.front_end_hot)>(frame);
+    out.group_incomplete = get<group_incomplete_layout, decltype(out.group_incomplete)>(frame);
     return out;
   }
   /// Calls see(name, unit, value, layout) for each signal.
@@ -1663,6 +1668,7 @@ struct MoreFaults {
     see("InsulationLow", "", insulation_low, insulation_low_layout);
     see("InsulationUnknown", "", insulation_unknown, insulation_unknown_layout);
     see("FrontEndHot", "", front_end_hot, front_end_hot_layout);
+    see("GroupIncomplete", "", group_incomplete, group_incomplete_layout);
   }
   /// Calls see(name, comment, names of values) for each signal: texts for people.
   template <class See>
@@ -1684,6 +1690,7 @@ struct MoreFaults {
     see("InsulationLow", "The resistance between battery and frame is below 100 ohm per volt: charging is forbidden.", std::span<const ValueName>());
     see("InsulationUnknown", "The insulation monitor has given no value for a minute.", std::span<const ValueName>());
     see("FrontEndHot", "The die of the measuring chip is above 95 degC. At 110 degC the chip would shut down and open under load, so the firmware opens before.", std::span<const ValueName>());
+    see("GroupIncomplete", "Nothing has arrived from a battery of the group at one DC link for a second, or no group is set: nothing closes (firmware/parallel/README.md). Only of an image for one of several batteries.", std::span<const ValueName>());
   }
 };
 
@@ -3117,6 +3124,8 @@ struct ParameterValue {
   static constexpr std::uint32_t number_canopen_node = 17;
   static constexpr std::uint32_t number_canopen_charger = 18;
   static constexpr std::uint32_t number_inputs_fitted = 19;
+  static constexpr std::uint32_t number_group_node = 20;
+  static constexpr std::uint32_t number_group_batteries = 21;
   static constexpr SignalLayout value_layout = {24, 32, true, 1.0F, 0.0F, -2147483648.0F, 2147483647.0F, false, 0};
   std::int32_t value = 0;  ///< In the unit of the parameter.
 
@@ -3146,7 +3155,7 @@ struct ParameterValue {
   template <class See>
   static void each_in_words(See&& see) {
     { static constexpr std::array<ValueName, 4> names{{ValueName{0, "value"}, ValueName{1, "lowest"}, ValueName{2, "highest"}, ValueName{3, "initial"}}}; see("Kind", "What Value is. Of the block (number 0): its CRC-32, revision and state.", std::span<const ValueName>(names)); }
-    { static constexpr std::array<ValueName, 20> names{{ValueName{0, "block"}, ValueName{1, "cell voltage max"}, ValueName{2, "cell voltage min"}, ValueName{3, "charge current max"}, ValueName{4, "discharge current max"}, ValueName{5, "temperature max"}, ValueName{6, "temperature min"}, ValueName{7, "charge temperature min"}, ValueName{8, "voltage delay"}, ValueName{9, "temperature delay"}, ValueName{10, "capacity"}, ValueName{11, "shunt"}, ValueName{12, "precharge time"}, ValueName{13, "closing difference"}, ValueName{14, "can bit rate"}, ValueName{15, "can base"}, ValueName{16, "can stop"}, ValueName{17, "canopen node"}, ValueName{18, "canopen charger"}, ValueName{19, "inputs fitted"}}}; see("Number", "Number of the parameter; 0: the block of all parameters.", std::span<const ValueName>(names)); }
+    { static constexpr std::array<ValueName, 22> names{{ValueName{0, "block"}, ValueName{1, "cell voltage max"}, ValueName{2, "cell voltage min"}, ValueName{3, "charge current max"}, ValueName{4, "discharge current max"}, ValueName{5, "temperature max"}, ValueName{6, "temperature min"}, ValueName{7, "charge temperature min"}, ValueName{8, "voltage delay"}, ValueName{9, "temperature delay"}, ValueName{10, "capacity"}, ValueName{11, "shunt"}, ValueName{12, "precharge time"}, ValueName{13, "closing difference"}, ValueName{14, "can bit rate"}, ValueName{15, "can base"}, ValueName{16, "can stop"}, ValueName{17, "canopen node"}, ValueName{18, "canopen charger"}, ValueName{19, "inputs fitted"}, ValueName{20, "group node"}, ValueName{21, "group batteries"}}}; see("Number", "Number of the parameter; 0: the block of all parameters.", std::span<const ValueName>(names)); }
     see("Value", "In the unit of the parameter.", std::span<const ValueName>());
   }
 };

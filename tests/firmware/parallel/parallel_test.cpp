@@ -333,5 +333,41 @@ TEST(Parallel, TwoBatteriesWithTheSameNodeDoNotClose) {
   EXPECT_FALSE(group.batteries[0].closed);
 }
 
+/// A group of two next to a battery that is set for a larger one.
+TEST(Parallel, NothingClosesWhileOneSendsThatIsNotOfTheGroup) {
+  ParallelBattery first({.node = 1, .batteries = 2});
+  Presence own, second, third;
+  own.state = second.state = third.state = State::open;
+  second.node = 2;
+  third.node = 3;
+  std::uint64_t time_us = 0;
+  const auto may_close = [&](bool third_sends) {
+    bool once = false;
+    for (int k = 0; k < 80; ++k) {
+      time_us += 100'000;
+      first.receive(second, time_us);
+      if (third_sends) first.receive(third, time_us);
+      once = first.step(own, Request::drive, time_us).may_close || once;
+    }
+    return once;
+  };
+  EXPECT_FALSE(may_close(true));
+  EXPECT_FALSE(first.decision().complete);
+  EXPECT_TRUE(may_close(false)) << "it was switched off";
+}
+
+/// Batteries allow nothing when they close, and more with every second.
+TEST(GroupLimit, FollowsTheRisingLimitsOfBatteriesThatHaveJustClosed) {
+  GroupLimit limit;
+  std::array<GroupLimit::Use, most_batteries> use{};
+  for (int k = 0; k <= 50; ++k) {
+    const std::int64_t allowed_ua = 2'000'000LL * k;
+    use[0] = {150'000, allowed_ua};  // an equalising current
+    use[1] = {-100'000, allowed_ua};
+    limit.update(use, 2, k == 0, 2'000'000, 100'000);
+    EXPECT_NEAR(static_cast<double>(limit.limit_ua()), 1.2 * static_cast<double>(allowed_ua), 1e3) << k;
+  }
+}
+
 }  // namespace
 }  // namespace bms::parallel

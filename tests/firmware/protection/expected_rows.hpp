@@ -80,6 +80,7 @@ inline constexpr ExpectedRow expected_rows[] = {
     {"insulation low", "InsulationLow", '<', 5'840, 10'000, 7'300, 60'000, 'a', "forbid charge"},
     {"insulation unknown", "InsulationUnknown", '>', 0, 60'000, 0, 10'000, 'a', "warn"},
     {"front end hot", "FrontEndHot", '>', 9'500, 2'000, 8'500, 60'000, 'a', "open"},
+    {"group incomplete", "GroupIncomplete", '>', 0, 1'000, 0, 5'000, 'a', "warn"},
 };
 
 }  // namespace bms::protection

@@ -186,6 +186,18 @@ TEST(Protection, BleedsWithAWarningAndNotWithAFaultThatOpensAtOnce) {
   }
 }
 
+TEST(Protection, AnIncompleteGroupIsAWarning) {
+  ProtectionBench b;
+  b.drive_off();
+  b.inputs.group_incomplete = true;
+  b.run(12);
+  EXPECT_EQ(b.protection.decision().faults, bit(Fault::group_incomplete));
+  EXPECT_EQ(b.protection.decision().state, ContactorState::drive);
+  b.inputs.group_incomplete = false;
+  b.run(60);
+  EXPECT_EQ(b.protection.decision().faults, 0U);
+}
+
 TEST(Protection, AStorageFailureIsAWarningAndARejectedVoltageDerates) {
   ProtectionBench b;
   b.drive_off();

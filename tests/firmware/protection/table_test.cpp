@@ -88,8 +88,8 @@ TEST(ProtectionTable, GivesTheFaultsOfEachReactionAndRecovery) {
   }
   for (const Recovery r : {Recovery::automatic, Recovery::on_clear, Recovery::service})
     by_recovery |= faults_with(rules, r);
-  EXPECT_EQ(by_reaction, 0x1'FFFF'FFFF'FFFFU) << "49 rows";
-  EXPECT_EQ(by_recovery, 0x1'FFFF'FFFF'FFFFU);
+  EXPECT_EQ(by_reaction, 0x3'FFFF'FFFF'FFFFU) << "50 rows";
+  EXPECT_EQ(by_recovery, 0x3'FFFF'FFFF'FFFFU);
 }
 
 /// Rounding is symmetric for both signs.

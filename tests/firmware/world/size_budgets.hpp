@@ -25,6 +25,9 @@ std::array<double, budget_columns> columns_of(const SizeBudget& b);
 
 /// Runs the image, and builds it if necessary.
 SizeBudget size_budget_of(std::size_t cells);
+/// The same for a battery of a group of two (BMS_PARALLEL), with cells of 100 Ah. Frames are those on the truck's bus.
+SizeBudget size_budget_of_group();
+inline constexpr const char* group_row = "24 cells, one of two in parallel";
 std::string size_budget_table();
 
 }  // namespace bms::world

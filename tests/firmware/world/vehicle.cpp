@@ -58,9 +58,11 @@ constexpr std::array names{"cell overvoltage warning",
                            "crash",
                            "insulation low",
                            "insulation unknown",
-                           "front end hot"};
+                           "front end hot",
+                           "group incomplete"};
 constexpr std::uint32_t faults_id = 0x196, more_faults_id = 0x1A2, state_id = 0x197, allowed_id = 0x19F,
                         pack_state_id = 0x180, board_id = 0x1B9, inputs_id = 0x1BA;
+constexpr std::uint32_t dbc_base = 0x180, block = 0x40;
 constexpr double request_period_ms = 1'000;
 constexpr std::size_t most_seen = 4'096;
 
@@ -82,12 +84,17 @@ std::string fault_names(std::uint64_t faults) {
   return text.empty() ? "none" : text;
 }
 
+void Vehicle::send(can::Frame frame) {
+  if (!frame.long_id && frame.id >= dbc_base && frame.id < dbc_base + block) frame.id = frame.id - dbc_base + base;
+  board_.can.others.push_back({firmware::wire_frame(frame), 0, true});
+}
+
 void Vehicle::send(std::uint32_t code, std::uint32_t argument) {
   can::Command command;
   command.code = code;
   command.argument = argument;
   counter_ = can::next(counter_);
-  board_.can.others.push_back({firmware::wire_frame(command.frame(counter_)), 0, true});
+  send(command.frame(counter_));
 }
 
 void Vehicle::clear_faults(bool service) { send(can::Command::code_clear_faults, service ? 1 : 0); }
@@ -101,7 +108,8 @@ void Vehicle::publish(std::uint64_t faults, double at_ms) {
   seen_ |= faults;
 }
 
-void Vehicle::read(const can::Frame& frame, double at_ms) {
+void Vehicle::read(can::Frame frame, double at_ms) {
+  if (!frame.long_id && frame.id >= base && frame.id < base + block) frame.id = frame.id - base + dbc_base;
   ++frames[frame.id & 0x7FF];
   if (on_frame) on_frame(frame);
   switch (frame.id) {

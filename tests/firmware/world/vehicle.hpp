@@ -23,8 +23,11 @@ class Vehicle {
 
   Request request = Request::none;
   bool talks = true;
+  std::uint16_t base = 0x180;                       ///< where the identifiers of the board's messages begin on this bus
   std::function<void(const can::Frame&)> on_frame;  ///< each frame of the board, for other nodes
   void clear_faults(bool service = false);
+  /// frame: with the identifier of the DBC file.
+  void send(can::Frame frame);
 
   // what the board has published last
   std::uint64_t faults() const { return faults_; }  ///< one bit for each fault, also those of the second message
@@ -60,7 +63,7 @@ class Vehicle {
   std::array<unsigned, 2048> frames{};  ///< received frames by identifier
 
  private:
-  void read(const can::Frame& frame, double at_ms);
+  void read(can::Frame frame, double at_ms);
   void send(std::uint32_t code, std::uint32_t argument);
   void publish(std::uint64_t faults, double at_ms);
 

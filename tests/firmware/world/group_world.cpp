@@ -1,0 +1,210 @@
+#include "tests/firmware/world/group_world.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "files/cell_file.hpp"
+#include "images/chosen_image.hpp"
+#include "monitor/parameters.hpp"
+#include "monitor/service_client.hpp"
+#include "tests/cell_of_capacity.hpp"
+
+namespace bms::world {
+
+namespace {
+
+constexpr std::uint32_t bus_bits_per_second = 250'000, presence_id = 0x101, limits_id = 0x111;
+
+/// First identifier of a battery on the truck's bus. With 0x180 a third one would have that of a CANopen charger.
+std::uint16_t base_of(std::int32_t node, std::int32_t batteries) {
+  return static_cast<std::uint16_t>((batteries > 2 ? 0x100 : 0x180) + 0x40 * std::max(node - 1, 0));
+}
+
+std::uint64_t field(const can::Frame& frame, unsigned first, unsigned bits) {
+  std::uint64_t all = 0;
+  for (unsigned k = 0; k < 8; ++k) all |= static_cast<std::uint64_t>(frame.data[k]) << 8 * k;
+  return all >> first & ((std::uint64_t{1} << bits) - 1);
+}
+
+void read(SeenPresence& seen, const can::Frame& frame, double at_ms) {
+  seen.any = true;
+  seen.at_ms = at_ms;
+  if (frame.id >= limits_id) {
+    seen.discharge_a = 0.1 * static_cast<double>(field(frame, 16, 16));
+    seen.charge_a = 0.1 * static_cast<double>(field(frame, 32, 16));
+    return;
+  }
+  seen.state = static_cast<unsigned>(field(frame, 12, 2));
+  seen.leader = static_cast<unsigned>(field(frame, 14, 3));
+  seen.granted = static_cast<unsigned>(field(frame, 17, 3));
+  seen.open_circuit_v = 0.002 * static_cast<double>(field(frame, 24, 16));
+  seen.current_a = 0.1 * static_cast<std::int16_t>(field(frame, 40, 16));
+}
+
+WorldSetup in_parallel(WorldSetup setup) {
+  setup.truck.in_parallel = true;
+  return setup;
+}
+
+/// Of a battery after its workshop.
+const std::vector<std::uint8_t>& flash_of(std::int32_t node, std::int32_t batteries) {
+  static std::map<std::pair<std::int32_t, std::int32_t>, std::vector<std::uint8_t>> known;
+  auto& flash = known[{node, batteries}];
+  if (!flash.empty()) return flash;
+  TruckWorld world(parallel_pack().image, typical_setup(parallel_pack()));
+  world.fit_charger_bus(bus_bits_per_second);
+  world.run_ms(2'000);
+  if (node != 0 && !set_group(world, node, batteries)) throw std::runtime_error("the group was not set");
+  world.run_ms(500);
+  return flash = world.board.flash.bytes;
+}
+
+}  // namespace
+
+const Pack& parallel_pack() {
+  static const Pack pack = [] {
+    files::CellFile cell = files::read_cell("table9");
+    cell.parameters = tests::of_capacity(cell.parameters, truck_ah);
+    cell.name = "table9_100ah";
+    cell.source = "table9 with the capacity of 100 Ah";
+    cell = files::parse_cell(files::cell_text(cell), cell.name);
+    return Pack{truck_ah, cell.parameters.limits.discharge_current_max_a, 24,
+                images::chosen_image("stm32f405_80v", cell, {"parallel", {"-DBMS_PARALLEL=ON"}})};
+  }();
+  return pack;
+}
+
+bool set_group(TruckWorld& world, std::int32_t node, std::int32_t batteries) {
+  monitor::ReceivedParameters all;
+  const auto before = std::exchange(world.vehicle.on_frame, [&](const can::Frame& f) { all.receive(f); });
+  world.vehicle.send(monitor::ReceivedParameters::request(1));
+  world.run_until([&] { return all.complete(); }, 8'000);
+  if (!all.complete()) return false;
+  auto wanted = all.raw();
+  wanted[monitor::find_parameter("group_node")->number - 1U] = node;
+  wanted[monitor::find_parameter("group_batteries")->number - 1U] = batteries;
+  wanted[monitor::find_parameter("can_base")->number - 1U] = base_of(1, batteries);
+  monitor::ServiceClient client({}, 42, monitor::commands_to_set(all.raw(), wanted));
+  world.vehicle.on_frame = [&](const can::Frame& f) { client.receive(f, world.now_s()); };
+  for (int k = 0; k < 400 && client.state() == monitor::ServiceClient::State::working; ++k) {
+    for (const can::Frame& f : client.due(world.now_s())) world.vehicle.send(f);
+    world.run_ms(50);
+  }
+  world.vehicle.on_frame = before;
+  return client.state() == monitor::ServiceClient::State::done;
+}
+
+Group::Group(const std::vector<Battery>& batteries) {
+  for (const Battery& b : batteries) {
+    worlds.push_back(std::make_unique<TruckWorld>(parallel_pack().image, in_parallel(b.setup)));
+    TruckWorld& world = *worlds.back();
+    world.board.flash.bytes = flash_of(b.node, b.batteries);
+    world.vehicle.base = base_of(b.node, b.batteries);
+    world.fit_charger_bus(bus_bits_per_second);
+  }
+  on_the_bus.assign(worlds.size(), true);
+  powered.assign(worlds.size(), true);
+  was_connected_.assign(worlds.size(), false);
+  presence.resize(4);
+}
+
+void Group::run_ms(double ms) {
+  for (double passed = 0; passed < ms - 1e-6; passed += slice_ms) {
+    load_a_ = connected() > 0 ? std::min(demand_a, allowed_discharge_a()) : 0;
+    for (const auto& world : worlds) {
+      world->truck.set_drive({.power_w = 0, .current_a = load_a_});
+      world->run_ms(slice_ms);
+    }
+    pass_frames();
+    pass_sources();
+    watch();
+  }
+}
+
+void Group::pass_frames() {
+  for (std::size_t k = 0; k < worlds.size(); ++k) {
+    auto& can = worlds[k]->charger_bus->can;
+    bool others = false;
+    for (std::size_t other = 0; other < worlds.size(); ++other)
+      others = others || (other != k && on_the_bus[k] && on_the_bus[other]);
+    can.others_acknowledge = others;
+    for (const firmware::SeenFrame& seen : std::exchange(can.seen, {})) {
+      if (!seen.from_board) continue;
+      const std::uint32_t node = (seen.frame.id & 0xF) - 1;
+      if (node < presence.size()) read(presence[node], seen.frame, worlds[k]->now_ms());
+      for (std::size_t other = 0; other < worlds.size(); ++other) {
+        if (other == k || !on_the_bus[k] || !on_the_bus[other]) continue;
+        worlds[other]->charger_bus->can.others.push_back({firmware::wire_frame(seen.frame), 0, true});
+      }
+    }
+  }
+}
+
+void Group::pass_sources() {
+  for (std::size_t k = 0; k < worlds.size(); ++k) {
+    plant::LinkSource all;
+    double amperes = 0;
+    for (std::size_t other = 0; other < worlds.size(); ++other) {
+      if (other == k) continue;
+      const plant::LinkSource source = worlds[other]->truck.link_source();
+      all.siemens += source.siemens;
+      amperes += source.siemens * source.emf_v;
+    }
+    all.emf_v = all.siemens > 0 ? amperes / all.siemens : 0;
+    worlds[k]->truck.set_other_batteries(all);
+  }
+}
+
+void Group::watch() {
+  no_load_ms_ = load_a_ == 0 ? no_load_ms_ + slice_ms : 0;
+  for (std::size_t k = 0; k < worlds.size(); ++k) {
+    const double a = std::abs(worlds[k]->truck.current_a());
+    const bool connected_now = worlds[k]->both_mains_closed();
+    if (no_load_ms_ > 50 && connected_now) largest_equalising_a = std::max(largest_equalising_a, a);
+    if (connected_now && !was_connected_[k]) {
+      for (std::size_t other = 0; other < worlds.size(); ++other) {
+        if (other == k || !was_connected_[other]) continue;
+        largest_closing_difference_v =
+            std::max(largest_closing_difference_v, std::abs(open_circuit_v(k) - open_circuit_v(other)));
+      }
+    }
+    was_connected_[k] = connected_now;
+    if (presence[k].discharge_a > 0 && connected_now && load_a_ > 0)
+      largest_use = std::max(largest_use, a / presence[k].discharge_a);
+  }
+}
+
+std::size_t Group::connected() const {
+  return static_cast<std::size_t>(std::ranges::count_if(worlds, [](const auto& w) { return w->both_mains_closed(); }));
+}
+
+void Group::request(Request wanted) {
+  for (const auto& world : worlds) world->vehicle.request = wanted;
+}
+
+double Group::allowed_discharge_a() const {
+  double most = 0;
+  for (const auto& world : worlds) {
+    if (world->vehicle.silent_ms() < 1'500) most = std::max(most, world->vehicle.allowed_discharge_a());
+  }
+  return most;
+}
+
+double Group::open_circuit_v(std::size_t k) const {
+  static const plant::MonotoneCurve curve = plant::table9_ocv_v();
+  plant::CellString& cells = worlds[k]->truck.cells();
+  double v = 0;
+  for (std::size_t cell = 0; cell < cells.size(); ++cell) v += curve.at(cells.soc(cell));
+  return v;
+}
+
+bool Group::key_off() {
+  demand_a = 0;
+  run_ms(500);
+  request(Request::none);
+  return run_until([&] { return connected() == 0; }, 8'000) >= 0;
+}
+
+}  // namespace bms::world

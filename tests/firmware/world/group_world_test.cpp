@@ -1,0 +1,226 @@
+// Batteries in parallel: the flashed image of stm32f405_80v with BMS_PARALLEL, two or three times, in one circuit.
+#include "tests/firmware/world/group_world.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+namespace bms::world {
+namespace {
+
+using ::testing::IsEmpty;
+
+constexpr unsigned group_incomplete = 49;
+constexpr double limit_a = 100, most_equalising_a = 35, most_apart_v = 0.7;  // firmware/parallel/README.md
+
+Group::Battery battery(std::int32_t node, double soc, double resistance = 1, std::int32_t batteries = 2) {
+  Group::Battery b{typical_setup(parallel_pack(), static_cast<std::uint64_t>(node)), node, batteries};
+  for (plant::StringCell& cell : b.setup.truck.cells) {
+    cell.soc = soc;
+    cell.resistance_factor = resistance;
+  }
+  return b;
+}
+
+std::string text_of(const Group& group) {
+  std::string text;
+  for (std::size_t k = 0; k < group.worlds.size(); ++k) {
+    const SeenPresence& p = group.presence[k];
+    text += fmt::format("\n  {}: {}; state {} leader {} granted {}, OCV {:.2f} V, {:.1f} A", k + 1,
+                        summary(*group.worlds[k]), p.state, p.leader, p.granted, p.open_circuit_v, p.current_a);
+  }
+  return text;
+}
+
+void expect_no_fault(const Group& group) {
+  for (const auto& world : group.worlds) {
+    EXPECT_EQ(fault_names(world->vehicle.faults_seen() & ~(std::uint64_t{1} << group_incomplete)), "none");
+    EXPECT_THAT(world->closings_below_v(closing_limit_v), IsEmpty());
+    EXPECT_THAT(world->violations(), IsEmpty());
+  }
+}
+
+/// Two batteries that drive together. The second one has cells with 1.5 times the resistance.
+class TwoBoards : public ::testing::Test {
+ protected:
+  void connect(double within_ms = 30'000) {
+    group.run_ms(2'500);
+    for (const auto& world : group.worlds) world->vehicle.forget();
+    group.request(Request::drive);
+    took_ms = group.run_until([&] { return group.connected() == 2; }, within_ms);
+    ASSERT_GE(took_ms, 0) << text_of(group);
+  }
+  void drive(double demand_a, double seconds) {
+    group.demand_a = demand_a;
+    group.run_ms(1e3 * seconds);
+    ASSERT_EQ(group.connected(), 2U) << text_of(group);
+  }
+
+  Group group{{battery(1, 0.55), battery(2, 0.56, 1.5)}};
+  double took_ms = 0;
+};
+
+TEST_F(TwoBoards, ConnectOneAfterTheOtherAndShareTheLoad) {
+  connect();
+  drive(0, 6);
+  std::printf("connected after %.1f s, equalising at most %.1f A, %.2f V apart\n", 1e-3 * took_ms,
+              group.largest_equalising_a, group.largest_closing_difference_v);
+  EXPECT_LE(group.largest_equalising_a, most_equalising_a);
+  EXPECT_LE(group.largest_closing_difference_v, most_apart_v);
+  EXPECT_GT(group.worlds[0]->vehicle.allowed_discharge_a(), limit_a) << "of both, by the leader";
+  EXPECT_EQ(group.worlds[1]->vehicle.allowed_discharge_a(), 0) << "the other one leaves it to the leader";
+  drive(1'000, 60);
+  std::printf("load %.0f A: %.1f A and %.1f A, the most used one has %.0f %% of its limit\n", group.load_a(),
+              group.presence[0].current_a, group.presence[1].current_a, 100 * group.largest_use);
+  EXPECT_GT(group.load_a(), 1.4 * limit_a) << "more than one battery alone";
+  EXPECT_LE(group.largest_use, 1.05);
+  EXPECT_NEAR(-group.presence[0].current_a - group.presence[1].current_a, group.load_a(), 5);
+  EXPECT_TRUE(group.key_off()) << text_of(group);
+  expect_no_fault(group);
+  for (const auto& world : group.worlds) EXPECT_FALSE(world->vehicle.fault(group_incomplete));
+}
+
+TEST_F(TwoBoards, ALostBusOpensTheOneThatDoesNotLeadAndIsNamed) {
+  connect();
+  drive(120, 10);
+  group.on_the_bus[1] = false;
+  const double ms = group.run_until([&] { return !group.worlds[1]->both_mains_closed(); }, 3'000);
+  std::printf("opened %.0f ms after the bus was cut\n", ms);
+  EXPECT_GE(ms, 900) << "1 s since the last message";
+  EXPECT_LE(ms, 1'200) << "and a sample, and the contactor";
+  group.run_ms(2'000);
+  EXPECT_TRUE(group.worlds[0]->both_mains_closed());
+  EXPECT_LE(std::abs(group.worlds[0]->truck.current_a()), 1.05 * limit_a);
+  for (const auto& world : group.worlds) EXPECT_TRUE(world->vehicle.fault(group_incomplete));
+  group.run_ms(5'000);
+  EXPECT_FALSE(group.worlds[1]->any_main_closed()) << "nothing closes without the bus";
+  group.on_the_bus[1] = true;
+  group.demand_a = 0;
+  EXPECT_GE(group.run_until([&] { return group.connected() == 2; }, 30'000), 0) << text_of(group);
+  group.run_ms(6'000);
+  for (const auto& world : group.worlds) EXPECT_FALSE(world->vehicle.fault(group_incomplete));
+  expect_no_fault(group);
+}
+
+TEST_F(TwoBoards, OneThatDropsOutUnderFullLoadLeavesTheOtherWithinItsLimit) {
+  connect();
+  drive(1'000, 40);
+  for (const std::size_t which : {1U, 0U}) {
+    SCOPED_TRACE(which);
+    TruckWorld &lost = *group.worlds[which], &other = *group.worlds[1 - which];
+    lost.interlock = false;  // a fault that opens at once
+    ASSERT_GE(group.run_until([&] { return !lost.any_main_closed(); }, 1'000), 0);
+    const double ms = group.run_until(
+        [&] { return !other.both_mains_closed() || std::abs(other.truck.current_a()) <= 1.02 * limit_a; }, 2'000);
+    std::printf("the other one is within its limit after %.0f ms\n", ms);
+    EXPECT_GE(ms, 0);
+    EXPECT_LE(ms, 600);
+    group.run_ms(5'000);
+    if (which == 1) {
+      EXPECT_TRUE(other.both_mains_closed()) << text_of(group);
+    }
+    lost.interlock = true;
+    group.demand_a = 0;
+    ASSERT_GE(group.run_until([&] { return group.connected() == 2; }, 60'000), 0) << text_of(group);
+    group.demand_a = 1'000;
+    group.run_ms(40'000);
+  }
+  EXPECT_LE(group.largest_equalising_a, most_equalising_a);
+}
+
+TEST(Boards, ThatDifferStayApart) {
+  Group group({battery(1, 0.20), battery(2, 0.95)});
+  group.run_ms(2'500);
+  group.request(Request::drive);
+  group.run_ms(20'000);
+  EXPECT_GT(group.open_circuit_v(1) - group.open_circuit_v(0), 1) << "the premise";
+  EXPECT_FALSE(group.worlds[0]->any_main_closed());
+  EXPECT_TRUE(group.worlds[1]->both_mains_closed()) << "the fuller one drives" << text_of(group);
+  expect_no_fault(group);
+}
+
+TEST(Boards, CloseNothingUntilTheyAreSet) {
+  Group group({battery(0, 0.5, 1, 0)});
+  group.request(Request::drive);
+  group.run_ms(10'000);
+  EXPECT_FALSE(group.worlds[0]->any_main_closed());
+  EXPECT_TRUE(group.worlds[0]->vehicle.fault(group_incomplete));
+}
+
+/// The other battery is in repair: nothing closes until the number is 1, which acts at once.
+TEST(Boards, DriveAloneAfterTheirGroupHasShrunk) {
+  Group group({battery(1, 0.5)});
+  group.run_ms(2'500);
+  group.request(Request::drive);
+  group.run_ms(10'000);
+  EXPECT_FALSE(group.worlds[0]->any_main_closed());
+  EXPECT_TRUE(group.worlds[0]->vehicle.fault(group_incomplete));
+  group.request(Request::none);
+  group.run_ms(1'500);
+  ASSERT_TRUE(set_group(*group.worlds[0], 1, 1));
+  group.request(Request::drive);
+  ASSERT_GE(group.run_until([&] { return group.connected() == 1; }, 20'000), 0) << text_of(group);
+  group.demand_a = 80;
+  group.run_ms(5'000);
+  EXPECT_NEAR(group.load_a(), 80, 1);
+  EXPECT_FALSE(group.worlds[0]->vehicle.fault(group_incomplete));
+  expect_no_fault(group);
+}
+
+/// One battery of a group of two that receives from a third one, or from one that has its own node.
+TEST(Boards, CloseNothingNextToOneThatIsNotOfTheGroup) {
+  for (const std::int32_t node : {1, 3}) {
+    SCOPED_TRACE(node);
+    Group group({battery(1, 0.5), battery(2, 0.5)});
+    Group stranger({battery(node, 0.5, 1, 3)});
+    group.run_ms(2'500);
+    group.request(Request::drive);
+    for (int k = 0; k < 2'000; ++k) {
+      group.run_ms(5);
+      auto& can = stranger.worlds[0]->charger_bus->can;
+      stranger.worlds[0]->run_ms(5);
+      can.others_acknowledge = true;
+      for (const firmware::SeenFrame& seen : std::exchange(can.seen, {})) {
+        for (const auto& world : group.worlds)
+          world->charger_bus->can.others.push_back({firmware::wire_frame(seen.frame), 0, true});
+      }
+    }
+    EXPECT_EQ(group.connected(), 0U) << text_of(group);
+    EXPECT_TRUE(group.worlds[0]->vehicle.fault(group_incomplete));
+  }
+}
+
+/// What is published about a battery under current, against the curve at the true charge of its cells. An estimator
+/// that does not know that its battery has 1.5 times the resistance is wrong by more, but that resistance bounds the
+/// current.
+TEST_F(TwoBoards, PublishTheirOpenCircuitVoltageUnderLoad) {
+  connect();
+  std::array<double, 2> worst_v{};
+  for (const double demand_a : {0.0, 150.0, 30.0, 180.0, 0.0, 90.0}) {
+    group.demand_a = demand_a;
+    for (int k = 0; k < 40; ++k) {
+      group.run_ms(500);
+      for (std::size_t b = 0; b < 2; ++b)
+        worst_v[b] = std::max(worst_v[b], std::abs(group.presence[b].open_circuit_v - group.open_circuit_v(b)));
+    }
+    std::printf(
+        "OCV at %.0f A and %.0f A: largest errors %.3f V and %.3f V; SOC %.2f %% of %.2f %%, %.2f %% of %.2f %%\n",
+        group.presence[0].current_a, group.presence[1].current_a, worst_v[0], worst_v[1],
+        group.worlds[0]->vehicle.soc_percent(), 100 * group.worlds[0]->truck.cells().soc(0),
+        group.worlds[1]->vehicle.soc_percent(), 100 * group.worlds[1]->truck.cells().soc(0));
+  }
+  EXPECT_LE(worst_v[0], 0.1) << "24 cells with the resistance of the cell file";
+  double ohm = 0;
+  for (const auto& world : group.worlds) ohm += 1 / world->truck.link_source().siemens;
+  std::printf("%.1f mohm\n", 1e3 * ohm);
+  EXPECT_LE((0.5 + worst_v[0] + worst_v[1]) / ohm, most_equalising_a);
+}
+
+}  // namespace
+}  // namespace bms::world
