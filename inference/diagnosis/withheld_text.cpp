@@ -64,7 +64,8 @@ std::string reason_of(const Withheld& w, const Diagnosis& of) {
         "all that speaks for {} lies between {:.0f} and {:.0f} s, and no healthy recording of this cell says how wrong "
         "the model is there; about {} of them would decide",
         name_of(w), w.only_place->start_s, w.only_place->end_s, hours_text(w.healthy.hours_needed.value_or(0)));
-  if (w.not_covered) return not_covered_reason(healthy);
+  // more hours where they were would not decide
+  if (w.not_covered || goes_beyond_healthy(of)) return not_covered_reason(healthy);
   if (w.healthy.hours_needed)
     return fmt::format("{} of healthy recordings are too little, about {} would do", hours_text(healthy.hours),
                        hours_text(*w.healthy.hours_needed));
@@ -91,8 +92,9 @@ std::string withheld_text(const Diagnosis& d, const std::string& error) {
         "{} Healthy recordings of this cell differ from the model as much, so no cause is named. Without "
         "them, {} would have been named. No action is needed.",
         error, name_of(d.withheld.front()));
-  const std::string action =
-      undecided->not_covered ? there : "Add healthy recordings of this cell (bms identify --healthy).";
+  const std::string action = undecided->not_covered || goes_beyond_healthy(d)
+                                 ? there
+                                 : "Add healthy recordings of this cell (bms identify --healthy).";
   return fmt::format(
       "Not enough healthy data to blame anything: {}. {} Without a comparison {} would have been named. {}",
       reason_of(*undecided, d), error, name_of(*undecided), action);
