@@ -97,6 +97,11 @@ HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
   return coverage_of(with_true_current(likelihood_, fit), healthy_, likelihood_.cell().capacity_ah);
 }
 
+double HealthyJudge::reach() const {
+  return has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah) ? thresholds.decision.tie_inseparable
+                                                                                : thresholds.decision.tie;
+}
+
 void HealthyJudge::cover_true_current(const Survivors& found) {
   basis_.covered = as_read_;
   if (is_covered()) return;
@@ -104,12 +109,9 @@ void HealthyJudge::cover_true_current(const Survivors& found) {
     if (c.share > basis_.covered.share) basis_.covered = std::move(c);
   };
   take_if_more(covered_by(found.best));
-  const double reach = has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah)
-                           ? thresholds.decision.tie_inseparable
-                           : thresholds.decision.tie;
   for (const auto& [m, rivals] : found.rivals) {
     for (const HypothesisFit& rival : rivals) {
-      if (search_.score(rival) - search_.score(found.best) < reach) take_if_more(covered_by(rival));
+      if (search_.score(rival) - search_.score(found.best) < reach()) take_if_more(covered_by(rival));
     }
   }
 }
@@ -118,7 +120,7 @@ Survivors HealthyJudge::with_current_sensor(Survivors found) {
   std::vector<std::size_t> sensor = scope_.searched;
   std::erase_if(sensor, [](std::size_t m) { return !is_of_current(m); });
   const std::vector<HypothesisFit> fits = search_.one_more(control_, sensor);
-  if (fits.empty() || search_.score(fits.front()) >= search_.score(found.best)) return found;
+  if (fits.empty() || search_.score(fits.front()) >= search_.score(found.best) + reach()) return found;
   return eliminate(search_, likelihood_, control_, fits.front(), scope_);
 }
 

@@ -50,6 +50,8 @@ class HealthyJudge {
   /// What healthy blocks stand for with the current sensor's error of a fit taken away; nothing if it has none, or if
   /// it leaves more than healthy recordings show.
   HealthyCoverage covered_by(const HypothesisFit& fit) const;
+  /// So far behind the best, a fit equals it.
+  double reach() const;
   /// A recording beyond the healthy ones is covered if it is by the best fit or by a rival that equals it.
   void cover_true_current(const Survivors& found);
   /// Result when current-sensor faults are tried first: a recording beyond the healthy ones may be there because of
