@@ -112,8 +112,8 @@ class Elimination {
   /// what is needed to be found, also over fewer that are others: two at their bounds do what one does well.
   bool resume() {
     const std::size_t most = std::max<std::size_t>(found_.best.hypothesis.added().size(), 1);
+    const double now = burdened(found_.best);
     const HypothesisFit* better = nullptr;
-    double least = burdened(found_.best);
     for (const auto& known : search_.best_of_each()) {
       const std::vector<std::size_t>& mechanisms = known.first;
       const HypothesisFit& fit = known.second;
@@ -122,11 +122,9 @@ class Elimination {
             return std::find(scope_.searched.begin(), scope_.searched.end(), m) != scope_.searched.end() &&
                    is_credible(fit, m);
           });
-      const bool as_many = better == nullptr && mechanisms.size() == found_.best.hypothesis.added().size();
-      if (!allowed || mechanisms.size() > most || burdened(fit) >= least - (as_many ? selection_limits.detected : 0))
-        continue;
-      better = &fit;
-      least = burdened(fit);
+      const double margin = mechanisms.size() == found_.best.hypothesis.added().size() ? selection_limits.detected : 0;
+      const bool least = better == nullptr || burdened(fit) < burdened(*better);
+      if (allowed && mechanisms.size() <= most && burdened(fit) < now - margin && least) better = &fit;
     }
     if (better == nullptr) return false;
     found_ = {*better, {}, {}, {}};
@@ -304,9 +302,9 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
   HypothesisFit& current = grown.fit;
   std::vector<std::size_t> steady = scope.searched;
   std::erase_if(steady, is_intermittent);
-  // one cause alone is compared with what is certain beforehand as well: with a strength that nothing limits, that one
-  // may take the place of any other
-  if (!scope.expected.empty()) grown.singles = search.one_more(control, steady);
+  // each cause alone, also without what is certain beforehand: with a strength that nothing limits, that one may take
+  // the place of any other
+  grown.singles = search.one_more(control, steady);
   for (const std::size_t m : scope.expected) {
     const std::vector<HypothesisFit> fits = search.one_more(current, {m});
     if (fits.empty()) continue;
@@ -316,10 +314,9 @@ Grown grow(Search& search, const HypothesisFit& control, const Scope& scope, std
   bool all = false;
   while (current.hypothesis.added().size() < most && !search.stopped()) {
     const bool alone = current.hypothesis.added().empty();
-    std::vector<HypothesisFit> fits = alone && !all && !grown.singles.empty()
-                                          ? grown.singles
-                                          : search.one_more(current, all ? scope.searched : steady);
-    if (alone && (all || grown.singles.empty())) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
+    std::vector<HypothesisFit> fits =
+        alone && !all ? grown.singles : search.one_more(current, all ? scope.searched : steady);
+    if (alone && all) grown.singles.insert(grown.singles.end(), fits.begin(), fits.end());
     std::erase_if(fits, [&](const HypothesisFit& f) { return !search.improves_lasting_error(current, f); });
     for (const HypothesisFit& f : fits) {
       double& gain = grown.gains[f.hypothesis.settings.back().index];
