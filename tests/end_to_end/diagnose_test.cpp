@@ -180,7 +180,8 @@ TEST_F(DiagnoseTool, SaysHowManyReadingsOfAHoldOutTheIntervalContains) {
 }
 
 TEST_F(DiagnoseTool, StoppedByCtrlCItNamesNothing) {
-  const std::string recording = simulated("now.csv", "leakage:current_a=0.12");
+  // of the whole shift: a fast machine has diagnosed the morning before the second is over
+  const std::string recording = simulated("now.csv", "leakage:current_a=0.12", 1, "0.98", 100'000);
   const int status = std::system(("timeout --foreground --preserve-status -s INT 1 \"" BMS_TOOL
                                   "\" diagnose --cell table9 --recording " +
                                   recording + " --initial-soc 0.98 --out " + path("x.toml") + " --json " +
