@@ -199,6 +199,7 @@ charge_fraction = 0.1
 [mechanism.charge_transfer]
 r0_share = 0.3
 r1_share = 0.5
+transfer_coefficient = 0.4
 [mechanism.contact_step]
 resistance_ohm = 0.001
 [mechanism.ocv_shape]

@@ -399,23 +399,6 @@ TEST(Arrhenius, IsTheExponentialLaw) {
   EXPECT_EQ(mechanism_detail::arrhenius<double>(20, 25, -273), 1) << "no temperature";
 }
 
-TEST(ChargeTransfer, FlattensByTheInverseHyperbolicSine) {
-  const ChargeTransfer::Law<double> law(std::array<double, 3>{1, 0.5, 2}, capacity_ah);
-  const ChargeTransfer::Law<float> single(std::array<double, 3>{1, 0.5, 2}, capacity_ah);
-  for (double a = -300; a <= 300; a += 0.37) {
-    const double x = a / 4, exact = std::abs(x) < 1e-9 ? 1 : std::asinh(x) / x;
-    TablePoint<double> at{};
-    at.r0_ohm = at.r1_ohm = 1;
-    law.tables(at, 0.5, {a, 1});
-    ASSERT_NEAR(at.r0_ohm / exact, 1, 1e-7) << a;
-    ASSERT_NEAR(at.r1_ohm, 0.5 + 0.5 * exact, 1e-7) << a;
-    TablePoint<float> f{};
-    f.r0_ohm = f.r1_ohm = 1;
-    single.tables(f, 0.5F, {static_cast<float>(a), 1});
-    ASSERT_NEAR(f.r0_ohm, exact, 1e-6) << a;
-  }
-}
-
 TEST(OcvShape, KeepsTheEndsAndSlidesByWhatItSaysInBetween) {
   const OcvShape::Law<double> law(std::array<double, 2>{0.05, -0.03}, capacity_ah);
   EXPECT_EQ(law.ocv_soc(0), 0);

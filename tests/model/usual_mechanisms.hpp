@@ -36,7 +36,7 @@ inline const std::vector<UsualMechanism>& usual_mechanisms() {
       {"polarisation_growth", {0.2, -0.3}},
       {"direction_asymmetry", {0.2}},
       {"temperature_resistance", {40'000, 35'000, 23, 0.4, 0.5, 0.1, -0.1, 0.6}},
-      {"charge_transfer", {0.4, 0.6, 2}},
+      {"charge_transfer", {0.4, 0.6, 2, 0.4}},
       {"contact_step", {0.003, 60}},
       {"contact_intermittent", {0.01, 0.1}},
       {"ocv_shape", {0.03, -0.02}},
