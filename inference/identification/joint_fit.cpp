@@ -272,8 +272,12 @@ void add_uncertainty(const JointModel& m, const JointProblem& problem, JointFit&
   // a prior has the weight of its standard deviation against runs of residuals as long as they have turned out to be
   jacobian.bottomRows(jacobian.rows() - data) *= std::sqrt(u.output_variance_v2 * u.correlation_length) / prior_weight;
   u = uncertainty(residuals, jacobian, data, fit.optimum.at_bound, 0);
-  for (Index k = 0; k < fit.std.size(); ++k)
-    fit.std[k] = u.std(k) * (m.unknowns[static_cast<std::size_t>(k)].positive ? fit.value[k] : 1);
+  for (Index k = 0; k < fit.std.size(); ++k) {
+    const JointUnknown& of = m.unknowns[static_cast<std::size_t>(k)];
+    // what the recordings do not show is known to be within its bounds all the same
+    const double uniform = (of.high - of.low) / std::sqrt(12.0), sigma = u.std(k) * (of.positive ? fit.value[k] : 1);
+    fit.std[k] = sigma < uniform ? sigma : uniform;  // also of one that is not a number
+  }
 }
 
 }  // namespace

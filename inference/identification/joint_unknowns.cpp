@@ -66,6 +66,15 @@ JointModel with_values(const JointModel& model, const Eigen::VectorXd& value) {
     if (u.of == JointUnknown::Of::c1) scale(with.cell.rc.c1_f);
     if (u.of == JointUnknown::Of::mechanism) with.mechanisms[place_of(model, u.mechanism)].value[u.parameter] = v;
   }
+  // A branch that no recording shows has any time constant. One beyond what a cell file accepts does not show in it.
+  auto& rc = with.cell.rc;
+  constexpr auto farad = model::accepted::capacitance_f;
+  constexpr auto seconds = model::accepted::time_constant_s;
+  constexpr double inside = 1 + 1e-9;  // the product of a quotient may miss the bound
+  for (std::size_t j = 0; j < rc.c1_f.size; ++j) {
+    const double low = std::max(farad.low, inside * seconds.low / rc.r1_ohm[j]);
+    rc.c1_f[j] = std::clamp(rc.c1_f[j], low, std::max(low, std::min(farad.high, seconds.high / inside / rc.r1_ohm[j])));
+  }
   return with;
 }
 

@@ -191,6 +191,20 @@ TEST(JointFit, StandardDeviationsCoverTheTruth) {
   EXPECT_GE(inside, all * 8 / 10);
 }
 
+TEST(JointFit, WhatRecordingsDoNotShowIsKnownToBeWithinItsBounds) {
+  JointRecording idle = recorded(Truth(), {.temperature_c = 25, .seed = 3});
+  for (double& a : idle.data.current_a.edit()) a = 0;
+  JointFit fit;
+  const auto candidates = joint_candidates(start_cell(), {}, std::vector<JointRecording>{idle});
+  const JointModel& model = one_pair(candidates).model;
+  ASSERT_NO_THROW(fit = fit_joint(model, std::vector<JointRecording>{idle}, {}));
+  for (std::size_t k = 0; k < model.unknowns.size(); ++k) {
+    const JointUnknown& u = model.unknowns[k];
+    const double sigma = fit.std[static_cast<Eigen::Index>(k)];
+    EXPECT_TRUE(sigma >= 0 && sigma <= (u.high - u.low) / std::sqrt(12.0)) << u.name() << " " << sigma;
+  }
+}
+
 TEST(JointFit, TheCurrentCorrectionIsTheOffsetThatTheReferenceShows) {
   for (const double offset_a : {-0.05, 0.0, 0.03}) {
     std::vector<double> soc;
