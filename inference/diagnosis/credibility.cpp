@@ -35,6 +35,12 @@ std::vector<Eigen::Index> places_of(const HypothesisFit& f, const std::set<std::
   return places;
 }
 
+/// Returns true for a share that is the whole. Beyond other bounds no cell or instrument is, so a fit that ends there
+/// explains something else.
+bool is_whole(const model::Parameter& p, double value) {
+  return p.per == model::Per::cell && p.unit == "1" && p.low == 0 && p.high == 1 && value == p.high;
+}
+
 /// Quantile of chi square that is `own_sigmas` of a single strength, by Wilson and Hilferty (1931).
 double chi_square_of_own_sigmas(Eigen::Index strengths) {
   const double share = numerics.statistics.wilson_hilferty / static_cast<double>(strengths),
@@ -62,6 +68,7 @@ bool is_weak(const HypothesisFit& f, std::size_t mechanism, const std::set<std::
     has_strength = true;
     const double value = s.value[sought[j].parameter], sigma = sigma_of(j, s.deviation[sought[j].parameter]);
     const bool known = std::isfinite(sigma) && sigma > 0;
+    if (is_whole(p, value)) return false;
     if (f.at_bound[j] == 0 && (!known || std::abs(value) >= credible_limits.own_sigmas * sigma)) return false;
   }
   return has_strength;

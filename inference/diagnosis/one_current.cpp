@@ -24,8 +24,8 @@ constexpr std::array<std::size_t, sizeof...(M)> indices = {model::mechanism_inde
 /// What changes the counted charge, and what changes the drop of the voltage alone.
 constexpr auto of_charge =
     indices<model::CurrentGain, model::CurrentOffset, model::CurrentClipping, model::CapacityChange>;
-constexpr auto of_drop = indices<model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation,
-                                 model::TemperatureResistance, model::ChargeTransfer>;
+constexpr auto of_drop =
+    indices<model::ResistanceGrowth, model::PolarisationGrowth, model::SlowPolarisation, model::TemperatureResistance>;
 
 template <class List>
 bool contains(const List& list, std::size_t m) {
@@ -35,8 +35,7 @@ bool contains(const List& list, std::size_t m) {
 /// What the sensor may read in rests, which its offset moves, and the reading of the load to the other side: the median
 /// of the small readings; and, for an offset that is no longer small compared with the load, those of the upper and of
 /// the lower half of the range.
-std::vector<double> rest_readings_a(const std::vector<PreparedRecording>& records, double largest_a,
-                                    double capacity_ah) {
+std::vector<double> rest_readings_a(std::span<const PreparedRecording> records, double largest_a, double capacity_ah) {
   double low_a = std::numeric_limits<double>::infinity(), high_a = -low_a;
   for (const PreparedRecording& r : records) {
     for (const double a : r.current_a) {
@@ -63,7 +62,7 @@ std::vector<double> rest_readings_a(const std::vector<PreparedRecording>& record
 }
 
 /// Returns true if all load has one current, if the sensor reads this much in rests.
-bool has_one_current(const std::vector<PreparedRecording>& records, double largest_a, double rest_a) {
+bool has_one_current(std::span<const PreparedRecording> records, double largest_a, double rest_a) {
   std::vector<double> loaded_a;
   for (const PreparedRecording& r : records) {
     for (const double a : r.current_a) {
@@ -116,7 +115,7 @@ void add_alike(Finding& f, std::vector<std::size_t> others, std::vector<Hypothes
 
 }  // namespace
 
-bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah) {
+bool has_one_current(std::span<const PreparedRecording> records, double capacity_ah) {
   double largest_a = current_limits.moving_c * capacity_ah / loaded_at_one_current;
   for (const PreparedRecording& r : records) {
     for (const double a : r.current_a) largest_a = std::isfinite(a) ? std::max(largest_a, std::abs(a)) : largest_a;
@@ -134,7 +133,7 @@ bool has_one_current(const std::vector<PreparedRecording>& records, double capac
 
 void add_alike_at_one_current(Search& search, const LikelihoodModel& likelihood, const HypothesisFit& best,
                               const HealthyGain& healthy_gain, std::vector<Finding>& findings) {
-  if (!has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) return;
+  if (!likelihood.facts().one_current) return;
   const Hypothesis base = likelihood.base();
   std::vector<std::size_t> found;
   for (const Finding& f : findings) found.push_back(f.setting.index);

@@ -7,6 +7,7 @@
 // no knee, so it equals only what fits as well.
 #pragma once
 
+#include <span>
 #include <vector>
 
 #include "diagnosis/findings.hpp"
@@ -24,7 +25,7 @@ inline constexpr double loaded_at_one_current = 0.3;
 inline constexpr double rest_at_one_current = 0.5;
 
 /// Returns true if nearly all load has one current in one direction, switched on or off only a few times.
-bool has_one_current(const std::vector<PreparedRecording>& records, double capacity_ah);
+bool has_one_current(std::span<const PreparedRecording> records, double capacity_ah);
 
 /// Adds to each finding of `best` those causes that equal it if the recordings have one current, each fitted in its
 /// place. healthy_gain: as in findings_of().

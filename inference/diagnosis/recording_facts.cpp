@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "diagnosis/charge_count.hpp"
+#include "diagnosis/one_current.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "measurement/spans.hpp"
 #include "measurement/statistics.hpp"
@@ -139,6 +140,7 @@ RecordingFacts recording_facts(const model::CellParameters<>& cell, std::span<co
   facts.read_span_a = read_a.span();
   facts.temperature_span_k = temperature_c.span();
   facts.rates = rates.size();
+  facts.one_current = has_one_current(records, capacity_ah);
   facts.rail_a = rail_a(facts.largest_a, capacity_ah, records);
   return facts;
 }

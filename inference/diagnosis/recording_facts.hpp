@@ -33,6 +33,7 @@ struct RecordingFacts {
   double longest_rest_s = 0;
   std::size_t reversals = 0;                              ///< turns of the charge's direction
   std::size_t rates = 0;                                  ///< sizes of current
+  bool one_current = false;                               ///< of nearly all load (one_current.hpp)
   bool start_given = false;                               ///< a user gave the initial soc of one at least
   std::optional<double> start_shift;                      ///< of the first recording's initial soc to another one
                                                           ///< that is stated and contradicts it

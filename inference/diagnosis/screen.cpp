@@ -52,17 +52,43 @@ Eigen::VectorXd Screen::toward(const Probe& probe) const {
   return products_[probe.block].toward().segment(probe.first, static_cast<Eigen::Index>(probe.parameters.size()));
 }
 
+namespace {
+
+/// The best changes of a probe's parameters, to first order. A strength that has one sign and would get the other one
+/// is left out; 0 if no strength is left, because nothing else acts without one.
+Eigen::VectorXd within_bounds(const Eigen::MatrixXd& gram, const Eigen::VectorXd& toward, const Probe& p) {
+  std::vector<Eigen::Index> free(p.parameters.size());
+  std::iota(free.begin(), free.end(), Eigen::Index{0});
+  while (true) {
+    const auto parameter = [&](Eigen::Index k) -> const model::Parameter& {
+      return model::catalogue[p.setting.index].parameter[p.parameters[static_cast<std::size_t>(k)]];
+    };
+    const bool any = std::any_of(free.begin(), free.end(), [&](auto k) { return parameter(k).role == Role::strength; });
+    Eigen::VectorXd found = Eigen::VectorXd::Zero(toward.size());
+    const bool first = !free.empty() && free.front() == 0;
+    if (!any || (!first && knowledge_of(p.setting.index).needs_first_strength)) return found;
+    const Eigen::MatrixXd of_free = gram(free, free);
+    const Eigen::VectorXd toward_free = toward(free), solved = of_free.ldlt().solve(toward_free);
+    for (std::size_t k = 0; k < free.size(); ++k) found[free[k]] = solved[static_cast<Eigen::Index>(k)];
+    const auto of_other_sign = [&](Eigen::Index k) {
+      const model::Parameter& of = parameter(k);
+      const std::size_t place = p.parameters[static_cast<std::size_t>(k)];
+      return of.role == Role::strength && knowledge_of(p.setting.index).bounds(place, {of.low, of.high}, 0).low >= 0 &&
+             found[k] + p.setting.value[place] < 0;
+    };
+    if (std::erase_if(free, of_other_sign) == 0) return found;
+  }
+}
+
+}  // namespace
+
 void Screen::judge(const LikelihoodModel& likelihood, const Probe& p) {
   const std::size_t mechanism = p.setting.index;
   const double capacity_ah = likelihood.cell().capacity_ah;
   Eigen::MatrixXd gram = products_[p.block].gram(p.first, static_cast<Eigen::Index>(p.parameters.size()));
   const Eigen::MatrixXd regular = with_ridge(gram);
-  const Eigen::VectorXd found = regular.ldlt().solve(toward(p));  // its best strengths, to first order
+  const Eigen::VectorXd found = within_bounds(regular, toward(p), p);
   double gain = std::max(0.0, toward(p).dot(found));
-  const model::Parameter& first = model::catalogue[mechanism].parameter[p.parameters[0]];
-  const double lowest = knowledge_of(mechanism).bounds(p.parameters[0], {first.low, first.high}, 0).low;
-  const bool one_sided = lowest >= 0 && first.role == Role::strength;
-  if (one_sided && found[0] + p.setting.value[p.parameters[0]] < 0) gain = 0;
   const std::size_t unknowns = p.parameters.size() + (is_searched(mechanism, capacity_ah) ? 1 : 0);
   gain -= (static_cast<double>(unknowns) - 1) * screening_limits.per_unknown;
 

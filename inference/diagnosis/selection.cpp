@@ -8,7 +8,6 @@
 #include "diagnosis/block_covariance.hpp"
 #include "diagnosis/credibility.hpp"
 #include "diagnosis/locate.hpp"
-#include "diagnosis/one_current.hpp"
 #include "diagnosis/testability.hpp"
 #include "diagnosis/thresholds.hpp"
 
@@ -64,7 +63,7 @@ class Elimination {
         control_(control),
         scope_(scope),
         error_v_(plain_error_v(likelihood, likelihood.base())),
-        one_current_(has_one_current(likelihood.records(), likelihood.cell().capacity_ah)) {
+        one_current_(likelihood.facts().one_current) {
     found_.best = grown;
   }
 

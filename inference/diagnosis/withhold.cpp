@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "diagnosis/healthy_coverage.hpp"
-#include "diagnosis/one_current.hpp"
 #include "diagnosis/thresholds.hpp"
 #include "diagnosis/true_current.hpp"
 
@@ -98,8 +97,7 @@ HealthyCoverage HealthyJudge::covered_by(const HypothesisFit& fit) const {
 }
 
 double HealthyJudge::reach() const {
-  return has_one_current(likelihood_.records(), likelihood_.cell().capacity_ah) ? thresholds.decision.tie_inseparable
-                                                                                : thresholds.decision.tie;
+  return likelihood_.facts().one_current ? thresholds.decision.tie_inseparable : thresholds.decision.tie;
 }
 
 void HealthyJudge::cover_true_current(const Survivors& found) {

@@ -23,15 +23,19 @@ struct Knowledge<model::ChargeTransfer> : DefaultKnowledge<model::ChargeTransfer
   static constexpr double smallest_current_c = 0.5;   ///< [C] at which the overvoltage bends
 
   static std::string claim(const MechanismSetting& s) {
+    const std::string beyond = quantity(2 * s.value[exchange_current], 2 * s.deviation[exchange_current], "A");
+    // a weak bend is known alone: a larger share that bends at larger currents makes the same
+    if (s.deviation[0] > s.value[0] / 2 && s.deviation[1] > s.value[1] / 2)
+      return fmt::format("an unknown share of the resistance decreases as the current comes near {}", beyond);
     return fmt::format("{} of R0 and {} of R1 decrease as the current exceeds {}", size_text(s, 0, "%"),
-                       size_text(s, 1, "%"),
-                       quantity(2 * s.value[exchange_current], 2 * s.deviation[exchange_current], "A"));
+                       size_text(s, 1, "%"), beyond);
   }
   static std::vector<double> probing_shapes(double capacity_ah) {
     return {0.2 * capacity_ah, 0.7 * capacity_ah, 2.5 * capacity_ah};
   }
   static std::optional<std::string> not_testable(const TestConditions& c) {
     if (c.current_below(smallest_current_c)) return "the current is too small to bend the overvoltage";
+    if (c.facts.one_current) return "the current has one size, at which it is a smaller resistance";
     return std::nullopt;
   }
 };

@@ -88,5 +88,20 @@ TEST(Credibility, AContactAtTheEndAloneIsAtTheEnd) {
   EXPECT_FALSE(is_at_the_end(f, skew, {of_1200_s()}));
 }
 
+TEST(Credibility, AShareThatIsTheWholeIsNotWeakAndAnEndOfARangeIs) {
+  constexpr std::size_t transfer = model::mechanism_index_of<model::ChargeTransfer>,
+                        sensor = model::mechanism_index_of<model::TemperatureSensor>;
+  const auto at_bounds = [](std::size_t mechanism, const model::MechanismValues<>& value) {
+    HypothesisFit f;
+    f.hypothesis.settings.push_back({mechanism, value, {}});
+    f.at_bound.assign(f.hypothesis.sought().size(), 1);
+    return f;
+  };
+  EXPECT_FALSE(is_weak(at_bounds(transfer, {0, 1, 10, 0.5}), transfer, {}));
+  EXPECT_TRUE(is_weak(at_bounds(transfer, {0, 0, 10, 0.5}), transfer, {}));
+  const double most = model::TemperatureSensor::parameters[0].high;
+  EXPECT_TRUE(is_weak(at_bounds(sensor, {most, 200}), sensor, {}));
+}
+
 }  // namespace
 }  // namespace bms::diagnosis

@@ -23,24 +23,26 @@ std::vector<double> discharge(double current_a, std::size_t seconds) {
 }
 
 TEST(OneCurrent, ADischargeHasItAndADriveOrASquareWaveHasNot) {
-  EXPECT_TRUE(has_one_current({test::recorded(discharge(-6, 3'000), 0.95, 1)}, capacity_ah));
+  EXPECT_TRUE(has_one_current(std::vector{test::recorded(discharge(-6, 3'000), 0.95, 1)}, capacity_ah));
   PreparedRecording with_offset = test::recorded(discharge(-6, 3'000), 0.95, 1);
   for (double& a : with_offset.current_a.edit()) a += 0.8;
-  EXPECT_TRUE(has_one_current({with_offset}, capacity_ah)) << "an offset at rest is not a second load";
+  EXPECT_TRUE(has_one_current(std::vector{with_offset}, capacity_ah)) << "an offset at rest is not a second load";
   for (double& a : with_offset.current_a.edit()) a += 0.9;
-  EXPECT_TRUE(has_one_current({with_offset}, capacity_ah)) << "1.7 A at rest, -4.3 A under load";
+  EXPECT_TRUE(has_one_current(std::vector{with_offset}, capacity_ah)) << "1.7 A at rest, -4.3 A under load";
   for (double& a : with_offset.current_a.edit()) a += 1.2;
-  EXPECT_FALSE(has_one_current({with_offset}, capacity_ah)) << "2.9 A at rest: more than an offset can be";
-  EXPECT_FALSE(has_one_current({test::recorded(test::drive(1, 2), 0.8, 2)}, capacity_ah));
+  EXPECT_FALSE(has_one_current(std::vector{with_offset}, capacity_ah)) << "2.9 A at rest: more than an offset can be";
+  EXPECT_FALSE(has_one_current(std::vector{test::recorded(test::drive(1, 2), 0.8, 2)}, capacity_ah));
   std::vector<double> square;
   for (int k = 0; k < 40; ++k) square.insert(square.end(), 60, k % 2 == 0 ? -6 : 0);
-  EXPECT_FALSE(has_one_current({test::recorded(square, 0.95, 3)}, capacity_ah)) << "its edges show the resistance";
+  EXPECT_FALSE(has_one_current(std::vector{test::recorded(square, 0.95, 3)}, capacity_ah))
+      << "its edges show the resistance";
   std::vector<double> both_ways = discharge(-6, 1'000);
   both_ways.insert(both_ways.end(), 1'000, 6.0);
-  EXPECT_FALSE(has_one_current({test::recorded(both_ways, 0.9, 4)}, capacity_ah));
+  EXPECT_FALSE(has_one_current(std::vector{test::recorded(both_ways, 0.9, 4)}, capacity_ah));
   std::vector<double> a_third = discharge(-6, 1'000);
   a_third.insert(a_third.end(), 300, 2.4);
-  EXPECT_FALSE(has_one_current({test::recorded(a_third, 0.9, 4)}, capacity_ah)) << "it rests at 0, so 2.4 A are a load";
+  EXPECT_FALSE(has_one_current(std::vector{test::recorded(a_third, 0.9, 4)}, capacity_ah))
+      << "it rests at 0, so 2.4 A are a load";
 }
 
 TEST(OneCurrent, AnErrorOfTheCurrentIsNotNamedAsAnotherCauseAlone) {

@@ -6,6 +6,8 @@
 #include <gtest/gtest.h>
 
 #include "diagnosis/prepare.hpp"
+#include "diagnosis/screen.hpp"
+#include "diagnosis/thresholds.hpp"
 #include "tests/inference/diagnosis/synthetic_recordings.hpp"
 
 namespace bms::diagnosis {
@@ -36,6 +38,25 @@ TEST(Search, AFitThatIsCompletedStandsInAMinimum) {
   const HypothesisFit again = likelihood.fit(best.hypothesis, best.calibration);
   EXPECT_LT(best.cost - again.cost, 1);
   EXPECT_GT(search.score(begun) - search.score(best), 1);  // there was something to gain
+}
+
+TEST(Screen, AStrengthThatWouldBeNegativeIsNoneAndTheOthersAreJudgedWithoutIt) {
+  // R1 flattens as the current grows, R0 does the opposite: the best shares of both are negative and positive
+  constexpr std::size_t transfer = model::mechanism_index_of<model::ChargeTransfer>;
+  double flat_v = 0;
+  const PreparedRecording r = test::recorded(test::drive(2, 52), 0.7, 52, [&](std::size_t, double a, double) {
+    const double x = a / 6, less_v = x == 0 ? 0 : a * (1 - std::asinh(x) / x);
+    flat_v += (0.004 * less_v - flat_v) / 30;
+    return 0.0005 * less_v - flat_v;
+  });
+  LikelihoodModel likelihood = likelihood_model_of(test::table9(), {}, {r});
+  const HypothesisFit control = likelihood.fit(likelihood.base());
+  const Screen screen(likelihood, control, {transfer});
+  ASSERT_EQ(screen.candidates().size(), 1U);
+  const Candidate& c = screen.candidates().front();
+  EXPECT_GT(c.gain, thresholds.decision.detected);
+  EXPECT_LT(c.start.value[0], 0.01);
+  EXPECT_GT(c.start.value[1], 0.1);
 }
 
 }  // namespace
