@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,7 +19,8 @@ namespace bms::world {
 
 namespace {
 
-constexpr std::uint32_t bus_bits_per_second = 250'000, presence_id = 0x101, limits_id = 0x111;
+constexpr std::uint32_t bus_bits_per_second = 250'000, presence_id = 0x101, limits_id = 0x111,
+                        canopen_request_id = 0x40A;  // of receive PDO 3 of the charger
 
 /// First identifier of a battery on the truck's bus. With 0x180 a third one would have that of a CANopen charger.
 std::uint16_t base_of(std::int32_t node, std::int32_t batteries) {
@@ -52,11 +54,11 @@ WorldSetup in_parallel(WorldSetup setup) {
 }
 
 /// Of a battery after its workshop.
-const std::vector<std::uint8_t>& flash_of(std::int32_t node, std::int32_t batteries) {
-  static std::map<std::pair<std::int32_t, std::int32_t>, std::vector<std::uint8_t>> known;
-  auto& flash = known[{node, batteries}];
+const std::vector<std::uint8_t>& flash_of(const Pack& pack, std::int32_t node, std::int32_t batteries) {
+  static std::map<std::tuple<std::filesystem::path, std::int32_t, std::int32_t>, std::vector<std::uint8_t>> known;
+  auto& flash = known[{pack.image, node, batteries}];
   if (!flash.empty()) return flash;
-  TruckWorld world(parallel_pack().image, typical_setup(parallel_pack()));
+  TruckWorld world(pack.image, typical_setup(pack));
   world.fit_charger_bus(bus_bits_per_second);
   world.run_ms(2'000);
   if (node != 0 && !set_group(world, node, batteries)) throw std::runtime_error("the group was not set");
@@ -66,8 +68,11 @@ const std::vector<std::uint8_t>& flash_of(std::int32_t node, std::int32_t batter
 
 }  // namespace
 
-const Pack& parallel_pack() {
-  static const Pack pack = [] {
+const Pack& parallel_pack(const std::string& vehicle_profile) {
+  static std::map<std::string, Pack> packs;
+  const auto known = packs.find(vehicle_profile);
+  if (known != packs.end()) return known->second;
+  const Pack pack = [&] {
     files::CellFile cell = files::read_cell("table9");
     cell.parameters = tests::of_capacity(cell.parameters, truck_ah);
     cell.parameters.tolerance.resistance_fraction = 0.5;  // firmware/parallel/README.md
@@ -75,9 +80,11 @@ const Pack& parallel_pack() {
     cell.source = "table9 with the capacity of 100 Ah, and resistances of an aged battery";
     cell = files::parse_cell(files::cell_text(cell), cell.name);
     return Pack{truck_ah, cell.parameters.limits.discharge_current_max_a, 24,
-                images::chosen_image("stm32f405_80v", cell, {"parallel", {"-DBMS_PARALLEL=ON"}})};
+                images::chosen_image("stm32f405_80v", cell,
+                                     {vehicle_profile == "none" ? "parallel" : "parallel-" + vehicle_profile,
+                                      {"-DBMS_PARALLEL=ON", "-DBMS_VEHICLE_PROFILE=" + vehicle_profile}})};
   }();
-  return pack;
+  return packs.emplace(vehicle_profile, pack).first->second;
 }
 
 bool set_group(TruckWorld& world, std::int32_t node, std::int32_t batteries) {
@@ -100,13 +107,19 @@ bool set_group(TruckWorld& world, std::int32_t node, std::int32_t batteries) {
   return client.state() == monitor::ServiceClient::State::done;
 }
 
-Group::Group(const std::vector<Battery>& batteries) {
+Group::Group(const std::vector<Battery>& batteries, const std::string& vehicle_profile) {
+  const Pack& pack = parallel_pack(vehicle_profile);
   for (const Battery& b : batteries) {
-    worlds.push_back(std::make_unique<TruckWorld>(parallel_pack().image, in_parallel(b.setup)));
+    worlds.push_back(std::make_unique<TruckWorld>(pack.image, in_parallel(b.setup)));
     TruckWorld& world = *worlds.back();
-    world.board.flash.bytes = flash_of(b.node, b.batteries);
+    world.board.flash.bytes = flash_of(pack, b.node, b.batteries);
     world.vehicle.base = base_of(b.node, b.batteries);
     world.fit_charger_bus(bus_bits_per_second);
+    world.vehicle.on_frame = [this, &world, k = worlds.size() - 1](const can::Frame& frame) {
+      if (charger == nullptr) return;
+      charger->receive(frame, world.now_s());
+      if (frame.long_id || frame.id == canopen_request_id) ++to_charger[k];
+    };
   }
   on_the_bus.assign(worlds.size(), true);
   powered.assign(worlds.size(), true);
@@ -117,7 +130,7 @@ Group::Group(const std::vector<Battery>& batteries) {
 
 void Group::run_ms(double ms) {
   for (double passed = 0; passed < ms - 1e-6; passed += slice_ms) {
-    load_a_ = followed_a();
+    load_a_ = charger != nullptr ? -charger_a() : followed_a();
     for (const auto& world : worlds) {
       world->truck.set_drive({.power_w = 0, .current_a = load_a_});
       world->run_ms(slice_ms);
@@ -169,12 +182,27 @@ double Group::followed_a() {
   return connected() > 0 ? std::clamp(demand_a, -charge_a, discharge_a) : 0;
 }
 
+/// The charger's current, and its frames to all batteries.
+double Group::charger_a() {
+  const double now_s = worlds[0]->now_s();
+  const auto closed = [](const auto& w) { return w->both_mains_closed() && w->closed(plant::Relay::charge); };
+  const auto at = std::ranges::find_if(worlds, closed);
+  const double volts = at != worlds.end() ? (*at)->truck.voltages().dc_link_v() : 0;
+  const double amperes = charger->current_a(volts, at != worlds.end(), now_s);
+  charger->measured(volts, amperes);
+  for (const can::Frame& frame : charger->send(now_s)) {
+    for (const auto& world : worlds) world->board.can.others.push_back({firmware::wire_frame(frame), 0, true});
+  }
+  return amperes;
+}
+
 void Group::watch() {
   no_load_ms_ = load_a_ == 0 ? no_load_ms_ + slice_ms : 0;
   double siemens = 0, amperes = 0;
   for (std::size_t k = 0; k < worlds.size(); ++k) {
     const bool connected_now = worlds[k]->both_mains_closed();
-    if (no_load_ms_ > 50 && connected_now)
+    // alone, a battery charges the capacitor of the DC link with what is left after its precharge
+    if (no_load_ms_ > 50 && connected_now && connected() > 1)
       largest_equalising_a = std::max(largest_equalising_a, std::abs(worlds[k]->truck.current_a()));
     if (connected_now && !was_connected_[k]) watch_closing(k);
     was_connected_[k] = connected_now;

@@ -6,6 +6,7 @@
 // receives, as firmware/parallel/README.md says.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "tests/firmware/charger_models.hpp"
 #include "tests/firmware/world/operating.hpp"
 #include "tests/firmware/world/truck_world.hpp"
 
@@ -26,8 +28,8 @@ struct SeenPresence {
   double open_circuit_v = 0, current_a = 0, discharge_a = 0, charge_a = 0;
 };
 
-/// 24 cells of a truck and the image for one battery of a group.
-const Pack& parallel_pack();
+/// 24 cells of a truck and the image for one battery of a group, with a profile of a charger.
+const Pack& parallel_pack(const std::string& vehicle_profile = "none");
 
 inline constexpr unsigned group_incomplete = 49;  ///< number of this fault
 /// What firmware/parallel/README.md states: equalising current, true difference of the OCVs at a closing.
@@ -44,7 +46,7 @@ class Group {
   };
 
   /// Batteries as they come from the workshop, before their first sample.
-  explicit Group(const std::vector<Battery>& batteries);
+  explicit Group(const std::vector<Battery>& batteries, const std::string& vehicle_profile = "none");
 
   void run_ms(double ms);
   /// Returns the milliseconds until the condition holds, or a negative value.
@@ -80,6 +82,9 @@ class Group {
   /// Largest difference of the true OCVs at the closing of a battery next to another one [V].
   double largest_closing_difference_v = 0;
   double slice_ms = 5;
+  /// On the truck's bus, and at the DC link through the charger contactors. nullptr: none.
+  firmware::Charger* charger = nullptr;
+  std::array<std::size_t, 4> to_charger{};  ///< frames for it that each battery has sent
 
  private:
   void pass_frames();
@@ -89,6 +94,7 @@ class Group {
   void watch_limit(std::size_t k);
   std::pair<double, double> allowed_a() const;  ///< discharge and charge
   double followed_a();
+  double charger_a();
 
   std::vector<bool> was_connected_;
   std::vector<double> over_ms_;

@@ -209,6 +209,61 @@ TEST_P(MoreBoards, ShareTheLoadDropOutLoseTheBusAndReturn) {
 
 INSTANTIATE_TEST_SUITE_P(OfAGroup, MoreBoards, ::testing::Values(3, 4));
 
+/// The fuller battery has 1.5 times the resistance; a charger of either protocol on the bus of all.
+class ChargedGroup : public ::testing::TestWithParam<const char*> {
+ protected:
+  static std::vector<Group::Battery> batteries() {
+    std::vector<Group::Battery> all{battery(1, 0.985), battery(2, 0.988, 1.5)};
+    for (Group::Battery& b : all) b.setup.truck.ocv_v = firmware::ocv_beyond_full();
+    return all;
+  }
+  double soc(std::size_t k) const { return group.worlds[k]->truck.cells().soc(0); }
+  double highest_v() const { return std::max(group.worlds[0]->highest_cell_v(), group.worlds[1]->highest_cell_v()); }
+
+  Group group{batteries(), GetParam()};
+};
+
+TEST_P(ChargedGroup, IsFilledByTheLeaderAndEndsTogether) {
+  firmware::ElconCharger elcon;
+  firmware::CanopenCharger canopen(24 * 3.55);
+  firmware::Charger& charger = std::string(GetParam()) == "elcon" ? static_cast<firmware::Charger&>(elcon) : canopen;
+  charger.rated_a = 120;
+  group.charger = &charger;
+  const double begun_ms = group.run_until([&] { return group.load_a() < -40; }, 60'000);
+  ASSERT_GE(begun_ms, 0) << text_of(group);
+  EXPECT_EQ(group.connected(), 2U);
+  group.to_charger.fill(0);  // at key-on another one may have led for a sample
+  double highest = 0, largest_use = 0;
+  const double ended_ms = group.run_until(
+      [&] {
+        highest = std::max(highest, highest_v());
+        for (std::size_t k = 0; k < 2; ++k) {
+          const SeenPresence& p = group.presence[k];
+          if (p.charge_a > 10) largest_use = std::max(largest_use, group.worlds[k]->truck.current_a() / p.charge_a);
+        }
+        return group.connected() == 0;
+      },
+      1'800'000);
+  ASSERT_GE(ended_ms, 0) << text_of(group);
+  std::printf(
+      "%s: 40 A after %.1f s, over after %.0f s at %.1f %% and %.1f %%, highest cell %.3f V, the most used one "
+      "%.0f %% of its limit, frames %zu and %zu\n",
+      GetParam(), 1e-3 * begun_ms, 1e-3 * ended_ms, 100 * soc(0), 100 * soc(1), highest, 100 * largest_use,
+      group.to_charger[0], group.to_charger[1]);
+  EXPECT_GT(soc(0), 0.995);
+  EXPECT_GT(soc(1), 0.995);
+  EXPECT_LT(highest, 3.65);
+  EXPECT_LE(largest_use, 1.05);
+  EXPECT_GT(group.to_charger[0], 100U);
+  EXPECT_EQ(group.to_charger[1], 0U) << "only the leader speaks";
+  group.run_ms(20'000);
+  EXPECT_EQ(group.connected(), 0U) << "still plugged in: the charge is over";
+  expect_no_fault(group);
+}
+
+INSTANTIATE_TEST_SUITE_P(By, ChargedGroup, ::testing::Values("elcon", "cia418"),
+                         [](const auto& profile) { return std::string(profile.param); });
+
 TEST(Boards, ThatDifferStayApart) {
   Group group({battery(1, 0.20), battery(2, 0.95)});
   group.run_ms(2'500);
