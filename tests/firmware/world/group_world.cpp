@@ -19,7 +19,7 @@ namespace bms::world {
 
 namespace {
 
-constexpr std::uint32_t bus_bits_per_second = 250'000, presence_id = 0x101, limits_id = 0x111,
+constexpr std::uint32_t bus_bits_per_second = 250'000, limits_id = 0x111,
                         canopen_request_id = 0x40A;  // of receive PDO 3 of the charger
 
 /// First identifier of a battery on the truck's bus. With 0x180 a third one would have that of a CANopen charger.

@@ -220,15 +220,18 @@ class ChargedGroup : public ::testing::TestWithParam<const char*> {
   double soc(std::size_t k) const { return group.worlds[k]->truck.cells().soc(0); }
   double highest_v() const { return std::max(group.worlds[0]->highest_cell_v(), group.worlds[1]->highest_cell_v()); }
 
+  firmware::Charger& charger() {
+    return std::string(GetParam()) == "elcon" ? static_cast<firmware::Charger&>(elcon) : canopen;
+  }
+
+  firmware::ElconCharger elcon;
+  firmware::CanopenCharger canopen{24 * 3.55};
   Group group{batteries(), GetParam()};
 };
 
 TEST_P(ChargedGroup, IsFilledByTheLeaderAndEndsTogether) {
-  firmware::ElconCharger elcon;
-  firmware::CanopenCharger canopen(24 * 3.55);
-  firmware::Charger& charger = std::string(GetParam()) == "elcon" ? static_cast<firmware::Charger&>(elcon) : canopen;
-  charger.rated_a = 120;
-  group.charger = &charger;
+  charger().rated_a = 120;
+  group.charger = &charger();
   const double begun_ms = group.run_until([&] { return group.load_a() < -40; }, 60'000);
   ASSERT_GE(begun_ms, 0) << text_of(group);
   EXPECT_EQ(group.connected(), 2U);
@@ -259,6 +262,25 @@ TEST_P(ChargedGroup, IsFilledByTheLeaderAndEndsTogether) {
   group.run_ms(20'000);
   EXPECT_EQ(group.connected(), 0U) << "still plugged in: the charge is over";
   expect_no_fault(group);
+}
+
+TEST_P(ChargedGroup, OneThatDropsOutLeavesTheOtherWithinItsLimit) {
+  for (const auto& world : group.worlds) {
+    for (std::size_t cell = 0; cell < world->truck.cell_count(); ++cell) world->truck.cells().set_soc(cell, 0.6);
+  }
+  charger().rated_a = 300;
+  group.charger = &charger();
+  ASSERT_GE(group.run_until([&] { return group.load_a() < -1.2 * limit_a; }, 60'000), 0) << text_of(group);
+  const double before_a = -group.load_a();
+  group.longest_over_ms = 0;
+  group.worlds[1]->interlock = false;
+  group.run_ms(5'000);
+  std::printf("%s: %.0f A before, %.0f A after it, above its limit for %.0f ms\n", GetParam(), before_a,
+              -group.load_a(), group.longest_over_ms);
+  EXPECT_TRUE(group.worlds[0]->both_mains_closed()) << text_of(group);
+  EXPECT_LE(-group.load_a(), 1.02 * limit_a);
+  EXPECT_GT(-group.load_a(), 0.3 * limit_a) << "the charge goes on";
+  EXPECT_LE(group.longest_over_ms, 1'000);
 }
 
 INSTANTIATE_TEST_SUITE_P(By, ChargedGroup, ::testing::Values("elcon", "cia418"),
