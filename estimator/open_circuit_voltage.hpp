@@ -6,9 +6,7 @@
 // Each is wrong by something else: the first one by the SOC and the curve, the second one by the resistances, so not at
 // rest. The result is their mean, each with the inverse of its variance: at rest the reading decides, under a large
 // current the model. Batteries of a group have up to twice the resistance of a new one (firmware/parallel/README.md),
-// so the drop is known to no better than itself: tolerance.resistance_fraction is of a calibrated cell, and with it a
-// battery of 1.5 times the resistance was wrong by 0.68 V at 67 A, without it by 0.24 V (group_world_test). Memory:
-// none.
+// so the drop is known to no better than itself. Memory: none.
 #pragma once
 
 #include <cstdint>

@@ -88,7 +88,7 @@ class Application {
     observe(pack, estimate);
     if constexpr (hal::has_group_bus)
       group_.update(Board::parameters().active(), pack.current_ua, Board::open_circuit_uv(estimator_, mean, estimate),
-                    protection_.decision(), Board::plan().contactors.rest_ua, pack.time_us, inputs);
+                    protection_.decision(), Board::plan().contactors.rest_ua, pack.time_us, vehicle_profile_, inputs);
     protect(pack, estimate, inputs, losses);
     truck_.judge_sensors(mean, inputs.second_current_ua, protection_.decision(), board_);
     for (std::size_t k = 0; cells > 1 && k < cells; ++k) {

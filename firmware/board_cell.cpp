@@ -9,6 +9,12 @@
 
 namespace bms::firmware {
 
+// hal/ has it from board_config.hpp, protection/ from a definition for all sources (cmake/firmware.cmake).
+static_assert(
+    protection::with_group == hal::has_group_bus &&
+        protection::with_group == protection::HasGroupIncomplete<protection::ExternalInputs>,
+    "fault and parameters of a group are in an image exactly if it has a bus between batteries (BMS_PARALLEL)");
+
 void BoardCell::update_condition(estimator::Condition<Estimator>& condition, const Estimator& estimator,
                                  const measurement::Sample& sample, const Estimator::Result& estimate,
                                  bool limits_wanted) {
@@ -22,6 +28,10 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 
 std::int32_t BoardCell::open_circuit_uv(const Estimator& estimator, const measurement::Sample& mean,
                                         const Estimator::Result& estimate) {
+  // Else the estimator takes the drop of an aged battery for a lower charge (firmware/parallel/README.md).
+  static_assert(!hal::has_group_bus || generated::parameters.tolerance.resistance_fraction >= 0.5,
+                "batteries of a group (BMS_PARALLEL) have up to twice the resistance of the cell file: state "
+                "tolerance.resistance_fraction of at least 0.5 in it");
   if constexpr (hal::has_group_bus) {
     const std::int32_t uv = estimator::open_circuit_uv(tables(), mean, estimate, estimator);
     if (uv != measurement::no_reading) return static_cast<std::int32_t>(cells) * uv;

@@ -13,11 +13,16 @@
 // below the limit: 3.55 V of 3.65 V. So the charger reduces its current before the battery has to. After each of the
 // last four the charger has to go away before the next charge: the contactors are open meanwhile, so nothing discharges
 // the battery. Memory: 72 bytes.
+//
+// In a group (firmware/parallel/) the leader alone speaks to the charger: it asks for what the group may carry until
+// the charge of each connected battery is over. One that is full remains connected at the target meanwhile.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
 
+#include "board_config.hpp"  // generated from boards/<board>/board.cmake
+#include "firmware/charge_of_group.hpp"
 #include "firmware/snapshot.hpp"
 #include "protection/contactors.hpp"
 
@@ -31,7 +36,7 @@ struct ChargerReport {
   std::int32_t output_uv = measurement::no_reading;
 };
 
-class ChargeControl {
+class ChargeControl : public ChargeOfGroup<hal::has_group_bus> {
  public:
   static constexpr std::uint64_t tail_for_us = 60'000'000, stalled_after_us = 1'800'000'000,
                                  longest_us = 57'600'000'000, longest_at_target_us = 14'400'000'000,
@@ -51,7 +56,7 @@ class ChargeControl {
     if (!charger.present) return begin();
     charging_ = now.decision.outputs.charge_enable && now.decision.state == protection::ContactorState::charge;
     allowed_ua_ = charging_ && wanted() ? now.decision.allowed.charge_ua : 0;
-    if (!charging_ || !wanted()) return;
+    if (!charging_ || !own_wanted()) return;
     std::int32_t highest_uv = 0;
     for (const std::int32_t uv : now.pack.cell_uv) {
       if (uv != measurement::no_reading) highest_uv = std::max(highest_uv, uv);
@@ -65,11 +70,12 @@ class ChargeControl {
   }
 
   /// The charger should charge: no charge has ended since it came.
-  constexpr bool wanted() const { return phase_ <= ChargePhase::voltage; }
+  constexpr bool wanted() const { return group_wants(own_wanted()); }
+  constexpr bool own_wanted() const { return phase_ <= ChargePhase::voltage; }
   constexpr ChargePhase phase() const { return phase_; }
   constexpr std::int32_t target_uv() const { return target_uv_; }
   /// Current to ask for [uA]; 0 unless the contactors are closed for charging.
-  constexpr std::int32_t current_ua() const { return wanted() ? allowed_ua_ : 0; }
+  constexpr std::int32_t current_ua() const { return wanted() ? group_current_ua(allowed_ua_) : 0; }
 
  private:
   struct Seen {

@@ -65,14 +65,14 @@ class Cia418Profile {
     update_objects(now);
     const auto now_us = static_cast<std::uint32_t>(now.pack.time_us);
     if (hal::has_charger_bus && hal::can_listening()) truck_node_.update_heartbeat(now_us);
-    if (!hal::charger_listening()) return;
+    if (!control_.speaks() || !hal::charger_listening()) return;
     node_.update_heartbeat(now_us);
     if (node_.state() == canopen::NodeState::operational && cycle_.due(now_us, cycle_us)) send_pdos();
   }
 
   void receive(const can::Frame& frame, std::uint64_t now_us) {
     charger_.receive(frame, now_us);
-    node_.receive(frame, *this);
+    if (control_.speaks()) node_.receive(frame, *this);
   }
   /// A frame of the truck's bus, which is not that of the charger.
   void receive_from_truck(const can::Frame& frame) { truck_node_.receive(frame, *this); }
@@ -82,6 +82,7 @@ class Cia418Profile {
     return {charger_.present(now_us), charger_.operational(now_us) && control_.wanted()};
   }
   constexpr const ChargeControl& control() const { return control_; }
+  constexpr ChargeControl& control() { return control_; }
 
   /// Object dictionary, for the SDO server.
   canopen::Entry read(std::uint16_t index, std::uint8_t sub) const {
@@ -110,8 +111,9 @@ class Cia418Profile {
 
   template <class Estimator, std::size_t Cells>
   void update_objects(const Snapshot<Estimator, Cells>& now) {
-    const std::int32_t allowed_ua = now.decision.allowed.charge_ua;
-    const bool charge_me = now.decision.outputs.charge_enable && allowed_ua > 0 && control_.wanted();
+    const std::int32_t allowed_ua = hal::has_group_bus ? control_.current_ua() : now.decision.allowed.charge_ua;
+    const bool enabled = hal::has_group_bus || now.decision.outputs.charge_enable;
+    const bool charge_me = enabled && allowed_ua > 0 && control_.wanted();
     const std::int16_t cdegc = now.pack.temperature_cdegc[0];
     temperature_ = measurement::temperature_possible(cdegc) ? static_cast<std::int16_t>(cdegc * 2 / 25) : no_value;
     status_ = charge_me ? 1 : 0;

@@ -32,7 +32,9 @@ class ElconProfile {
   template <class Estimator, std::size_t Cells>
   void publish(const Snapshot<Estimator, Cells>& now) {
     control_.update(now, {.present = present(now.pack.time_us), .output_uv = output_uv_});
-    if (hal::charger_listening() && cycle_.due(static_cast<std::uint32_t>(now.pack.time_us), cycle_us)) send();
+    if (control_.speaks() && hal::charger_listening() &&
+        cycle_.due(static_cast<std::uint32_t>(now.pack.time_us), cycle_us))
+      send();
   }
 
   void receive(const can::Frame& frame, std::uint64_t now_us) {
@@ -52,6 +54,7 @@ class ElconProfile {
     return {here, here && repeated_ && healthy_ && control_.wanted()};
   }
   const ChargeControl& control() const { return control_; }
+  ChargeControl& control() { return control_; }
 
  private:
   bool present(std::uint64_t now_us) const { return received_ && now_us - received_us_ < timeout_us; }

@@ -4,6 +4,7 @@
 //
 //   request   that of the truck, as far as the group lets this battery follow it
 //   leave     the contactors open at once and without a fault, as if their coils had no supply
+//   charger   the profile of a charger speaks at the leader only, for the whole group (charge_of_group.hpp)
 //   limits    AllowedCurrent is that of the whole group at its leader and 0 at the others: a truck that obeys the
 //             largest one of all batteries obeys the leader
 //
@@ -37,9 +38,10 @@ class GroupSide<true> {
  public:
   /// Before the protections. last: their decision with the sample before. Changes request and coils_dead of `inputs`.
   /// open_circuit_uv: of the whole battery, or measurement::no_reading.
-  void update(const parameters::Values& values, std::int32_t current_ua, std::int32_t open_circuit_uv,
-              const protection::Decision& last, std::int32_t rest_ua, std::uint64_t now_us,
-              protection::ExternalInputs& inputs) {
+  template <class Profile>
+  [[gnu::noinline]] void update(const parameters::Values& values, std::int32_t current_ua, std::int32_t open_circuit_uv,
+                                const protection::Decision& last, std::int32_t rest_ua, std::uint64_t now_us,
+                                Profile& profile, protection::ExternalInputs& inputs) {
     follow(values, rest_ua);
     can::Frame frame;
     for (std::size_t k = 0; k < most_frames && hal::group_can_receive(frame); ++k) member_.receive(frame, now_us);
@@ -49,18 +51,28 @@ class GroupSide<true> {
       protection::set_group_incomplete(inputs, true);
       return;
     }
+    bool charge_wanted = false;
+    if constexpr (requires { profile.control(); }) charge_wanted = profile.control().own_wanted();
+    [[maybe_unused]] const bool charges = inputs.request == protection::Request::charge;
     order_ = member_.update({.request = inputs.request,
                              .state = last.state,
                              .open_circuit_uv = open_circuit_uv,
                              .current_ua = current_ua,
                              .allowed_discharge_ua = last.allowed.discharge_ua,
                              .allowed_charge_ua = last.allowed.charge_ua,
-                             .rest_ua = rest_ua},
+                             .rest_ua = rest_ua,
+                             .charge_wanted = charge_wanted},
                             now_us);
     for (const can::Frame& own : member_.frames()) hal::group_can_send(own);
     inputs.request = order_.request;
     inputs.coils_dead = inputs.coils_dead || order_.leave;
-    protection::set_group_incomplete(inputs, !member_.decision().complete);
+    const parallel::Decision& group = member_.decision();
+    protection::set_group_incomplete(inputs, !group.complete);
+    if constexpr (requires { profile.control(); }) {
+      if (!charges || group.connected == 0) closed_us_ = now_us;
+      const bool enabled = now_us - closed_us_ >= charge_enabled_us;
+      profile.control().join(group.leads, group.charge_wanted, enabled ? order_.charge_ua : 0);
+    }
   }
 
   /// The decision as it is published: with the current that the truck may draw from all batteries.
@@ -72,6 +84,8 @@ class GroupSide<true> {
   }
 
  private:
+  /// From the main contacts to the charger contactor: the self-test of one battery, 0.3 s, and two samples.
+  static constexpr std::uint64_t charge_enabled_us = 500'000;
   static constexpr std::size_t most_frames = 16;  ///< of the driver's ring: bounds the time of a sample
   static_assert(parallel::most_batteries == parameters::most_batteries);
   static_assert([] {
@@ -91,6 +105,7 @@ class GroupSide<true> {
     member_ = parallel::GroupMember({.node = node, .batteries = batteries, .rest_ua = rest_ua});
   }
 
+  std::uint64_t closed_us_ = 0;
   std::uint8_t node_ = 0, batteries_ = 0;
   parallel::GroupMember member_{{.node = 1, .batteries = 1}};
   parallel::GroupMember::Order order_;

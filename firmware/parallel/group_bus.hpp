@@ -36,6 +36,7 @@ class GroupBus {
     presence.state = static_cast<std::uint32_t>(state);
     presence.leader = own.leader;
     presence.granted = own.granted;
+    presence.charge_wanted = own.charge_wanted ? 1 : 0;
     if (voltage_known) presence.open_circuit_voltage = 1e-6F * static_cast<float>(own.open_circuit_uv);
     presence.current = 1e-6F * static_cast<float>(own.current_ua);
     limits.discharge = rounded_down_a(own.allowed_discharge_ua);
@@ -101,7 +102,8 @@ class GroupBus {
                     .allowed_discharge_ua = in_micro(limits.discharge),
                     .allowed_charge_ua = in_micro(limits.charge),
                     .leader = static_cast<std::uint8_t>(p.leader),
-                    .granted = static_cast<std::uint8_t>(p.granted)};
+                    .granted = static_cast<std::uint8_t>(p.granted),
+                    .charge_wanted = p.charge_wanted != 0};
   }
 
   struct Half {

@@ -31,6 +31,7 @@ class GroupMember {
     std::int32_t open_circuit_uv = measurement::no_reading, current_ua = measurement::no_reading;
     std::int32_t allowed_discharge_ua = 0, allowed_charge_ua = 0;
     std::int32_t rest_ua = 0;  ///< below it no current flows; of one battery
+    bool charge_wanted = false;
   };
   struct Order {
     protection::Request request = protection::Request::none;
@@ -50,6 +51,7 @@ class GroupMember {
     own_.current_ua = in.current_ua == measurement::no_reading ? 0 : in.current_ua;
     own_.allowed_discharge_ua = in.allowed_discharge_ua;
     own_.allowed_charge_ua = in.allowed_charge_ua;
+    own_.charge_wanted = in.charge_wanted;
     const Decision& d = logic_.step(own_, static_cast<Request>(in.request), time_us);
     const bool asked = in.request != protection::Request::none;
     const bool stays = closing(in.state) ? d.may_close : d.may_close && !d.must_open;

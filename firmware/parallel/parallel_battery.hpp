@@ -42,6 +42,7 @@ struct Presence {
   std::int32_t current_ua = 0;
   std::int32_t allowed_discharge_ua = 0, allowed_charge_ua = 0;  ///< at least 0
   std::uint8_t leader = 0, granted = 0;  ///< the node that it follows; as a leader: the battery that may close now
+  bool charge_wanted = false;            ///< its charge by a charger is not over
 };
 
 struct Design {
@@ -53,12 +54,13 @@ struct Design {
 struct Decision {
   std::uint8_t leader = 0;  ///< 0: none
   bool leads = false;
-  bool may_close = false;     ///< precharge and close, or stay closed
-  bool must_open = false;     ///< in an orderly way, within a second
-  bool leaderless = false;    ///< nothing has arrived from a leader for leave_us
-  bool complete = false;      ///< a Presence of every battery of the group arrives, and of no other one
-  std::size_t connected = 0;  ///< batteries, as far as they are present
-  std::int64_t total_ua = 0;  ///< their current: that of the truck or charger
+  bool may_close = false;      ///< precharge and close, or stay closed
+  bool must_open = false;      ///< in an orderly way, within a second
+  bool leaderless = false;     ///< nothing has arrived from a leader for leave_us
+  bool complete = false;       ///< a Presence of every battery of the group arrives, and of no other one
+  bool charge_wanted = false;  ///< of a connected battery: any of the connected ones wants it
+  std::size_t connected = 0;   ///< batteries, as far as they are present
+  std::int64_t total_ua = 0;   ///< their current: that of the truck or charger
   /// Of the whole group, for truck and charger; of a leader.
   std::int32_t group_discharge_ua = 0, group_charge_ua = 0;
 };
@@ -250,10 +252,13 @@ class ParallelBattery {
     std::size_t connected = 0;
     std::uint8_t which = 0;
     decision_.total_ua = 0;
+    const Presence& own = peers_[design_.node - 1U].last;
+    decision_.charge_wanted = own.charge_wanted;
     for (std::size_t k = 0; k < design_.batteries; ++k) {
       const Presence& p = peers_[k].last;
       if (!present(k) || p.state != State::connected) continue;
       decision_.total_ua += p.current_ua;
+      if (own.state == State::connected) decision_.charge_wanted = decision_.charge_wanted || p.charge_wanted;
       discharge[connected] = {-std::int64_t{p.current_ua}, p.allowed_discharge_ua};
       charge[connected++] = {p.current_ua, p.allowed_charge_ua};
       which = static_cast<std::uint8_t>(which | 1U << k);

@@ -48,17 +48,21 @@ struct ExternalInputs {
 #endif
 };
 
+template <class Inputs>
+concept HasGroupIncomplete = requires(const Inputs& inputs) {
+  inputs.group_incomplete;
+};
 /// ExternalInputs::group_incomplete of an image that has it.
 template <class Inputs>
 constexpr bool group_incomplete(const Inputs& inputs) {
-  if constexpr (requires { inputs.group_incomplete; })
+  if constexpr (HasGroupIncomplete<Inputs>)
     return inputs.group_incomplete;
   else
     return false;
 }
 template <class Inputs>
 constexpr void set_group_incomplete(Inputs& inputs, bool incomplete) {
-  if constexpr (requires { inputs.group_incomplete; }) inputs.group_incomplete = incomplete;
+  if constexpr (HasGroupIncomplete<Inputs>) inputs.group_incomplete = incomplete;
 }
 
 }  // namespace bms::protection

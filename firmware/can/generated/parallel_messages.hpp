@@ -1,5 +1,5 @@
 // Generated from parallel_bus.dbc by ./bms messages. Do not edit.
-// SHA-256 of that file: d2e3f45edeb94ebe32a79b308b0f28f33fa44ea265fc195b31ff95a0e4f0221a
+// SHA-256 of that file: 734b3c12533060a6541ca0947b7fc8f996d6b1c5e80d68344b9d39e277494a32
 #pragma once
 
 #include <array>
@@ -26,6 +26,8 @@ struct Presence1 {
   std::uint32_t leader = 0;  ///< Node of the battery that this one follows; 0: none.
   static constexpr SignalLayout granted_layout = {17, 3, false, 1.0F, 0.0F, 0.0F, 4.0F, false, 0};
   std::uint32_t granted = 0;  ///< Of a leader: node of the battery that may close now; 0: none.
+  static constexpr SignalLayout charge_wanted_layout = {20, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t charge_wanted = 0;  ///< Its charge by a charger is not over.
   static constexpr SignalLayout open_circuit_voltage_layout = {24, 16, false, 0.002F, 0.0F, 0.0F, 131.06F, true, 65535};
   float open_circuit_voltage = unknown;  ///< [V] Of the whole battery, by its estimator.
   static constexpr SignalLayout current_layout = {40, 16, true, 0.1F, 0.0F, -3276.7F, 3276.7F, true, -32768};
@@ -36,6 +38,7 @@ struct Presence1 {
     put<state_layout>(out, state);
     put<leader_layout>(out, leader);
     put<granted_layout>(out, granted);
+    put<charge_wanted_layout>(out, charge_wanted);
     put<open_circuit_voltage_layout>(out, open_circuit_voltage);
     put<current_layout>(out, current);
     protect(out, data_id, counter);
@@ -46,6 +49,7 @@ struct Presence1 {
     out.state = get<state_layout, decltype(out.state)>(frame);
     out.leader = get<leader_layout, decltype(out.leader)>(frame);
     out.granted = get<granted_layout, decltype(out.granted)>(frame);
+    out.charge_wanted = get<charge_wanted_layout, decltype(out.charge_wanted)>(frame);
     out.open_circuit_voltage = get<open_circuit_voltage_layout, decltype(out.open_circuit_voltage)>(frame);
     out.current = get<current_layout, decltype(out.current)>(frame);
     return out;
@@ -56,6 +60,7 @@ struct Presence1 {
     see("State", "", state, state_layout);
     see("Leader", "", leader, leader_layout);
     see("Granted", "", granted, granted_layout);
+    see("ChargeWanted", "", charge_wanted, charge_wanted_layout);
     see("OpenCircuitVoltage", "V", open_circuit_voltage, open_circuit_voltage_layout);
     see("Current", "A", current, current_layout);
   }
@@ -65,6 +70,7 @@ struct Presence1 {
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "unable"}, ValueName{1, "open"}, ValueName{2, "connected"}}}; see("State", "Unable: a fault, or readings are missing.", std::span<const ValueName>(names)); }
     see("Leader", "Node of the battery that this one follows; 0: none.", std::span<const ValueName>());
     see("Granted", "Of a leader: node of the battery that may close now; 0: none.", std::span<const ValueName>());
+    see("ChargeWanted", "Its charge by a charger is not over.", std::span<const ValueName>());
     see("OpenCircuitVoltage", "Of the whole battery, by its estimator.", std::span<const ValueName>());
     see("Current", "Positive: charging.", std::span<const ValueName>());
   }
@@ -85,6 +91,8 @@ struct Presence2 {
   std::uint32_t leader = 0;  ///< Node of the battery that this one follows; 0: none.
   static constexpr SignalLayout granted_layout = {17, 3, false, 1.0F, 0.0F, 0.0F, 4.0F, false, 0};
   std::uint32_t granted = 0;  ///< Of a leader: node of the battery that may close now; 0: none.
+  static constexpr SignalLayout charge_wanted_layout = {20, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t charge_wanted = 0;  ///< Its charge by a charger is not over.
   static constexpr SignalLayout open_circuit_voltage_layout = {24, 16, false, 0.002F, 0.0F, 0.0F, 131.06F, true, 65535};
   float open_circuit_voltage = unknown;  ///< [V] Of the whole battery, by its estimator.
   static constexpr SignalLayout current_layout = {40, 16, true, 0.1F, 0.0F, -3276.7F, 3276.7F, true, -32768};
@@ -95,6 +103,7 @@ struct Presence2 {
     put<state_layout>(out, state);
     put<leader_layout>(out, leader);
     put<granted_layout>(out, granted);
+    put<charge_wanted_layout>(out, charge_wanted);
     put<open_circuit_voltage_layout>(out, open_circuit_voltage);
     put<current_layout>(out, current);
     protect(out, data_id, counter);
@@ -105,6 +114,7 @@ struct Presence2 {
     out.state = get<state_layout, decltype(out.state)>(frame);
     out.leader = get<leader_layout, decltype(out.leader)>(frame);
     out.granted = get<granted_layout, decltype(out.granted)>(frame);
+    out.charge_wanted = get<charge_wanted_layout, decltype(out.charge_wanted)>(frame);
     out.open_circuit_voltage = get<open_circuit_voltage_layout, decltype(out.open_circuit_voltage)>(frame);
     out.current = get<current_layout, decltype(out.current)>(frame);
     return out;
@@ -115,6 +125,7 @@ struct Presence2 {
     see("State", "", state, state_layout);
     see("Leader", "", leader, leader_layout);
     see("Granted", "", granted, granted_layout);
+    see("ChargeWanted", "", charge_wanted, charge_wanted_layout);
     see("OpenCircuitVoltage", "V", open_circuit_voltage, open_circuit_voltage_layout);
     see("Current", "A", current, current_layout);
   }
@@ -124,6 +135,7 @@ struct Presence2 {
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "unable"}, ValueName{1, "open"}, ValueName{2, "connected"}}}; see("State", "Unable: a fault, or readings are missing.", std::span<const ValueName>(names)); }
     see("Leader", "Node of the battery that this one follows; 0: none.", std::span<const ValueName>());
     see("Granted", "Of a leader: node of the battery that may close now; 0: none.", std::span<const ValueName>());
+    see("ChargeWanted", "Its charge by a charger is not over.", std::span<const ValueName>());
     see("OpenCircuitVoltage", "Of the whole battery, by its estimator.", std::span<const ValueName>());
     see("Current", "Positive: charging.", std::span<const ValueName>());
   }
@@ -144,6 +156,8 @@ struct Presence3 {
   std::uint32_t leader = 0;  ///< Node of the battery that this one follows; 0: none.
   static constexpr SignalLayout granted_layout = {17, 3, false, 1.0F, 0.0F, 0.0F, 4.0F, false, 0};
   std::uint32_t granted = 0;  ///< Of a leader: node of the battery that may close now; 0: none.
+  static constexpr SignalLayout charge_wanted_layout = {20, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t charge_wanted = 0;  ///< Its charge by a charger is not over.
   static constexpr SignalLayout open_circuit_voltage_layout = {24, 16, false, 0.002F, 0.0F, 0.0F, 131.06F, true, 65535};
   float open_circuit_voltage = unknown;  ///< [V] Of the whole battery, by its estimator.
   static constexpr SignalLayout current_layout = {40, 16, true, 0.1F, 0.0F, -3276.7F, 3276.7F, true, -32768};
@@ -154,6 +168,7 @@ struct Presence3 {
     put<state_layout>(out, state);
     put<leader_layout>(out, leader);
     put<granted_layout>(out, granted);
+    put<charge_wanted_layout>(out, charge_wanted);
     put<open_circuit_voltage_layout>(out, open_circuit_voltage);
     put<current_layout>(out, current);
     protect(out, data_id, counter);
@@ -164,6 +179,7 @@ struct Presence3 {
     out.state = get<state_layout, decltype(out.state)>(frame);
     out.leader = get<leader_layout, decltype(out.leader)>(frame);
     out.granted = get<granted_layout, decltype(out.granted)>(frame);
+    out.charge_wanted = get<charge_wanted_layout, decltype(out.charge_wanted)>(frame);
     out.open_circuit_voltage = get<open_circuit_voltage_layout, decltype(out.open_circuit_voltage)>(frame);
     out.current = get<current_layout, decltype(out.current)>(frame);
     return out;
@@ -174,6 +190,7 @@ struct Presence3 {
     see("State", "", state, state_layout);
     see("Leader", "", leader, leader_layout);
     see("Granted", "", granted, granted_layout);
+    see("ChargeWanted", "", charge_wanted, charge_wanted_layout);
     see("OpenCircuitVoltage", "V", open_circuit_voltage, open_circuit_voltage_layout);
     see("Current", "A", current, current_layout);
   }
@@ -183,6 +200,7 @@ struct Presence3 {
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "unable"}, ValueName{1, "open"}, ValueName{2, "connected"}}}; see("State", "Unable: a fault, or readings are missing.", std::span<const ValueName>(names)); }
     see("Leader", "Node of the battery that this one follows; 0: none.", std::span<const ValueName>());
     see("Granted", "Of a leader: node of the battery that may close now; 0: none.", std::span<const ValueName>());
+    see("ChargeWanted", "Its charge by a charger is not over.", std::span<const ValueName>());
     see("OpenCircuitVoltage", "Of the whole battery, by its estimator.", std::span<const ValueName>());
     see("Current", "Positive: charging.", std::span<const ValueName>());
   }
@@ -203,6 +221,8 @@ struct Presence4 {
   std::uint32_t leader = 0;  ///< Node of the battery that this one follows; 0: none.
   static constexpr SignalLayout granted_layout = {17, 3, false, 1.0F, 0.0F, 0.0F, 4.0F, false, 0};
   std::uint32_t granted = 0;  ///< Of a leader: node of the battery that may close now; 0: none.
+  static constexpr SignalLayout charge_wanted_layout = {20, 1, false, 1.0F, 0.0F, 0.0F, 1.0F, false, 0};
+  std::uint32_t charge_wanted = 0;  ///< Its charge by a charger is not over.
   static constexpr SignalLayout open_circuit_voltage_layout = {24, 16, false, 0.002F, 0.0F, 0.0F, 131.06F, true, 65535};
   float open_circuit_voltage = unknown;  ///< [V] Of the whole battery, by its estimator.
   static constexpr SignalLayout current_layout = {40, 16, true, 0.1F, 0.0F, -3276.7F, 3276.7F, true, -32768};
@@ -213,6 +233,7 @@ struct Presence4 {
     put<state_layout>(out, state);
     put<leader_layout>(out, leader);
     put<granted_layout>(out, granted);
+    put<charge_wanted_layout>(out, charge_wanted);
     put<open_circuit_voltage_layout>(out, open_circuit_voltage);
     put<current_layout>(out, current);
     protect(out, data_id, counter);
@@ -223,6 +244,7 @@ struct Presence4 {
     out.state = get<state_layout, decltype(out.state)>(frame);
     out.leader = get<leader_layout, decltype(out.leader)>(frame);
     out.granted = get<granted_layout, decltype(out.granted)>(frame);
+    out.charge_wanted = get<charge_wanted_layout, decltype(out.charge_wanted)>(frame);
     out.open_circuit_voltage = get<open_circuit_voltage_layout, decltype(out.open_circuit_voltage)>(frame);
     out.current = get<current_layout, decltype(out.current)>(frame);
     return out;
@@ -233,6 +255,7 @@ struct Presence4 {
     see("State", "", state, state_layout);
     see("Leader", "", leader, leader_layout);
     see("Granted", "", granted, granted_layout);
+    see("ChargeWanted", "", charge_wanted, charge_wanted_layout);
     see("OpenCircuitVoltage", "V", open_circuit_voltage, open_circuit_voltage_layout);
     see("Current", "A", current, current_layout);
   }
@@ -242,6 +265,7 @@ struct Presence4 {
     { static constexpr std::array<ValueName, 3> names{{ValueName{0, "unable"}, ValueName{1, "open"}, ValueName{2, "connected"}}}; see("State", "Unable: a fault, or readings are missing.", std::span<const ValueName>(names)); }
     see("Leader", "Node of the battery that this one follows; 0: none.", std::span<const ValueName>());
     see("Granted", "Of a leader: node of the battery that may close now; 0: none.", std::span<const ValueName>());
+    see("ChargeWanted", "Its charge by a charger is not over.", std::span<const ValueName>());
     see("OpenCircuitVoltage", "Of the whole battery, by its estimator.", std::span<const ValueName>());
     see("Current", "Positive: charging.", std::span<const ValueName>());
   }

@@ -14,7 +14,8 @@ Presence battery(std::uint8_t node) {
           .allowed_discharge_ua = 280'199'999,
           .allowed_charge_ua = 100'050'000,
           .leader = 1,
-          .granted = 3};
+          .granted = 3,
+          .charge_wanted = node % 2 == 0};
 }
 
 std::optional<Presence> received(GroupBus& to, const std::array<can::Frame, 2>& frames) {
@@ -36,6 +37,7 @@ TEST(GroupBus, BringsAPresenceOfEachNodeWithinItsResolution) {
     EXPECT_NEAR(p->allowed_charge_ua, 100'000'000, 50);
     EXPECT_EQ(p->leader, 1);
     EXPECT_EQ(p->granted, 3);
+    EXPECT_EQ(p->charge_wanted, node % 2 == 0);
   }
 }
 

@@ -265,6 +265,24 @@ TEST(Parallel, ABatteryTooFullOrTooEmptyStaysOpenWhateverTheLoad) {
   EXPECT_TRUE(charging.batteries[1].closed) << "the emptier one charges first";
 }
 
+/// A full battery that is connected goes on with the others, and an open one does not come back for them.
+TEST(Parallel, AChargeIsOverWhenThatOfEachConnectedBatteryIs) {
+  constexpr std::uint64_t now_us = 100'000;
+  for (const bool own_wants : {false, true}) {
+    for (const bool other_wants : {false, true}) {
+      for (const State other : {State::unable, State::open, State::connected}) {
+        for (const State own_state : {State::open, State::connected}) {
+          ParallelBattery logic({.node = 1, .batteries = 2});
+          Presence own{.state = own_state, .charge_wanted = own_wants};
+          logic.receive({.node = 2, .state = other, .charge_wanted = other_wants}, now_us);
+          const bool with_other = own_state == State::connected && other == State::connected;
+          EXPECT_EQ(logic.step(own, Request::charge, now_us).charge_wanted, own_wants || (with_other && other_wants));
+        }
+      }
+    }
+  }
+}
+
 TEST(Parallel, WhileNothingArrivesFromOneNothingCloses) {
   Group group(2, 4, 0.01);
   group.batteries[2].powered = false;

@@ -47,5 +47,6 @@ Result run_overloads(const Extent& extent);
 Result run_shift(const Extent& extent);
 Result run_charges(const Extent& extent);  ///< chargers of both protocols, on images with their profiles
 Result run_month(const Extent& extent);    ///< ordinary days: three shifts each, with what a driver does
+Result run_groups(const Extent& extent);   ///< two and four batteries at one DC link (BMS_PARALLEL)
 
 }  // namespace bms::world

@@ -1,6 +1,7 @@
 // Runs the flashed image of the forklift board in the circuit of a truck: ./bms world [SCENARIO] [OPTIONS]
 //
-//   SCENARIO         starts, contacts, dips, faults, overloads, shift, charges or month; all if not given
+//   SCENARIO         starts, contacts, dips, faults, overloads, shift, charges, month or groups; all if not
+//                    given
 //   --count N        so many worlds or cases instead of all
 //   --seed N         of the random worlds
 //   --only TEXT      cases whose names contain TEXT, or one of several texts, separated by |
@@ -41,7 +42,8 @@ struct Scenario {
 constexpr Scenario scenarios[] = {{"starts", run_starts},       {"contacts", run_contact_failures},
                                   {"dips", run_supply_dips},    {"faults", run_fault_matrix},
                                   {"overloads", run_overloads}, {"shift", run_shift},
-                                  {"charges", run_charges},     {"month", run_month}};
+                                  {"charges", run_charges},     {"month", run_month},
+                                  {"groups", run_groups}};
 
 struct Options {
   Extent extent;
@@ -118,8 +120,9 @@ Options read_options(const std::vector<std::string>& words) {
       options.scenario = words[k];
     }
   }
-  if (options.extent.cells != Extent{}.cells && (options.scenario.empty() || options.scenario == "charges"))
-    throw std::invalid_argument("--cells is for one scenario, and not for the charges");
+  if (options.extent.cells != Extent{}.cells &&
+      (options.scenario.empty() || options.scenario == "charges" || options.scenario == "groups"))
+    throw std::invalid_argument("--cells is for one scenario, and not for charges and groups");
   return options;
 }
 
