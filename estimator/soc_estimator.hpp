@@ -327,7 +327,7 @@ class SocEstimator {
     count_.begin(estimate.soc);
     errors_.start(estimate.soc);
     monitor_.start(cell);
-    monitor_.bank().open_at(estimate.soc, PriorMisfit<S>{{estimate.soc, anything}});
+    monitor_.bank().open_at(estimate.soc, PriorMisfit<S>({estimate.soc, anything}));
     return estimate;
   }
 
