@@ -92,7 +92,8 @@ class SocEstimator {
       count_.lose(Variance(noise[Model::soc] - constants_.soc_noise()));
     }
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
-    state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
+    state_.covariance.template propagate<typename Model::Couples>(
+        Model::state_transition(state_.model_state, at, discretisation, input), noise);
     state_.model_state = Model::advance(state_.model_state, at, discretisation, input);
 
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
