@@ -66,8 +66,8 @@ class AmbiguousSoc {
     deviation_v2_ = deviation_v2;
   }
   /// The same after a first voltage, whose misfits the bank has.
-  [[gnu::noinline]] constexpr void open_after_voltage(const Soc& mean, const PriorMisfit<S>& prior,
-                                                      bool in_background) {
+  [[gnu::cold, gnu::noinline]] constexpr void open_after_voltage(const Soc& mean, const PriorMisfit<S>& prior,
+                                                                 bool in_background) {
     in_background_ = in_background;
     deviation_v2_ = Variance{};
     bank_.open_at(mean,

@@ -44,8 +44,9 @@ class FirstState {
   /// from, voltage_uv: nullptr if it is missing; not both. Opens the bank if the SOC is ambiguous, and in the
   /// background if it was given. Returns the tables at the first SOC.
   template <class Cell>
-  constexpr At set(const Cell& cell, const StepInput& input, bool current_measured, const Coupling& error,
-                   const measurement::StartingPoint* from, const std::int32_t* voltage_uv) {
+  [[gnu::cold, gnu::noinline]] constexpr At set(const Cell& cell, const StepInput& input, bool current_measured,
+                                                const Coupling& error, const measurement::StartingPoint* from,
+                                                const std::int32_t* voltage_uv) {
     SocDistribution<S> soc{Soc(0.5), Variance{}};
     const auto factor = Coupling(error + Coupling(1));
     if (from != nullptr) soc = given(*from);

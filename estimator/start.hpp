@@ -181,7 +181,7 @@ class StartSearch {
       : of_reading_(of_reading), prior_(prior) {}
 
   /// Mean and variance of the SOC, weighted by exp(-misfit). Leaves the misfits to the reading alone in the bank.
-  constexpr SocDistribution<S> run(Bank& bank) {
+  [[gnu::cold, gnu::noinline]] constexpr SocDistribution<S> run(Bank& bank) {
     int best = 0;
     Exponent least(0);
     for (int k = 0; k < Bank::points; ++k) {
@@ -228,7 +228,7 @@ class StartSearch {
 
   /// The finer points. The smallest misfit so far is subtracted from all, so that a voltage outside the curve still has
   /// weights.
-  constexpr SocSums<S> sums_around(int from, const Soc& about) {
+  [[gnu::cold, gnu::noinline]] constexpr SocSums<S> sums_around(int from, const Soc& about) {
     constexpr int finer = start_points / Bank::points;
     const Fraction half_step(0.5 / start_points);
     SocSums<S> sums;
