@@ -17,6 +17,7 @@
 #include "estimator/cell_state.hpp"
 #include "estimator/persistent_errors.hpp"
 #include "estimator/soc_bank.hpp"
+#include "estimator/start.hpp"
 #include "estimator/step_constants.hpp"
 #include "estimator/voltage_uncertainty.hpp"
 
@@ -56,16 +57,23 @@ class AmbiguousSoc {
   /// The bank only watches: the filter goes on until its state is contradicted.
   constexpr bool in_background() const { return in_background_; }
 
-  /// Starts the bank. mean: SOC of the filter; misfit(soc, half a step of the grid, interval): >= 0; deviation_v2:
-  /// variance of the voltage's error that the last half hour showed.
-  template <class Misfit>
-  constexpr void open_at(const Soc& mean, const Misfit& misfit, bool in_background = false,
+  /// Starts the bank. mean: SOC of the filter; deviation_v2: variance of the voltage's error that the last half hour
+  /// showed.
+  constexpr void open_at(const Soc& mean, const PriorMisfit<S>& prior, bool in_background = false,
                          const Variance& deviation_v2 = Variance{}) {
-    std::uint8_t interval = 0;
-    in_background_ = in_background;
+    bank_.clear_first_misfits();
+    open_after_voltage(mean, prior, in_background);
     deviation_v2_ = deviation_v2;
-    bank_.open_at(mean, [&](const Soc& soc) { return misfit(soc, half_step(), interval); });
   }
+  /// The same after a first voltage, whose misfits the bank has.
+  [[gnu::cold, gnu::noinline]] constexpr void open_after_voltage(const Soc& mean, const PriorMisfit<S>& prior,
+                                                                 bool in_background) {
+    in_background_ = in_background;
+    deviation_v2_ = Variance{};
+    bank_.open_at(mean,
+                  [&](int k) { return arithmetic::Exponent<S>(bank_.first_misfit(k) + prior(SocBank<S>::grid(k))); });
+  }
+  constexpr SocBank<S>& hypotheses() { return bank_; }
 
   /// The filter corrected its SOC by `by` while the bank watches.
   constexpr void follow(const Soc& by) { bank_.follow(by); }
@@ -81,7 +89,7 @@ class AmbiguousSoc {
         bank_.close();
         return BankEvent::none;
       }
-      bank_.open_at(soc, [](const Soc&) { return arithmetic::Exponent<S>(0); });
+      open_at(soc, PriorMisfit<S>(), false, deviation_v2_);
     }
     const auto operating_point = [&](const model::StepInput<S>& at_input, const ModelState& x) {
       return model::OperatingPoint{cell, at_input, Model::mechanism_states(x)};
@@ -96,7 +104,7 @@ class AmbiguousSoc {
       const auto polarised = Model::polarisation_at(reading_.model_state, reading_.at_1c_v,
                                                     at_1c_v(cell, reading_.input, reading_.model_state, at));
       const Voltage off_v = Voltage(reading_.voltage_v - Model::voltage(laws_of(cell), polarised, at, reading_.input));
-      const Variance axis_v2 = soc_axis_variance<S>(tables, cell.noise, at, there, off_v);
+      const Variance axis_v2 = soc_axis_variance<S>(tables, cell.noise, at, there, off_v, interval);
       return {.off_v = off_v,
               .half_v = Voltage(ocv_slope<S>(at) * half_step()),
               .new_v2 = reading_.new_v2,

@@ -44,8 +44,9 @@ class FirstState {
   /// from, voltage_uv: nullptr if it is missing; not both. Opens the bank if the SOC is ambiguous, and in the
   /// background if it was given. Returns the tables at the first SOC.
   template <class Cell>
-  constexpr At set(const Cell& cell, const StepInput& input, bool current_measured, const Coupling& error,
-                   const measurement::StartingPoint* from, const std::int32_t* voltage_uv) {
+  [[gnu::cold, gnu::noinline]] constexpr At set(const Cell& cell, const StepInput& input, bool current_measured,
+                                                const Coupling& error, const measurement::StartingPoint* from,
+                                                const std::int32_t* voltage_uv) {
     SocDistribution<S> soc{Soc(0.5), Variance{}};
     const auto factor = Coupling(error + Coupling(1));
     if (from != nullptr) soc = given(*from);
@@ -62,7 +63,7 @@ class FirstState {
         if (!load.is_that_of(there)) load = reading.load(there);
         return OcvReading<S>{read_v - Voltage(load.left_v + there.r0_ohm * input.current_a), load.v2, load.above_v2};
       };
-      soc = from_voltage(tables, from != nullptr, soc, present ? &of_ocv : nullptr);
+      soc = from_voltage(tables, from != nullptr ? &soc : nullptr, present ? &of_ocv : nullptr);
     }
     const At there = look_up(tables, soc.soc, interval_);
     const StartState left = reading.start_state(there);
@@ -196,16 +197,18 @@ class FirstState {
     return model::OperatingPoint{cell, input, Model::mechanism_states(state_.model_state)};
   }
 
-  /// reading: nullptr if it is missing.
+  /// before, reading: nullptr if it is missing; not both.
   template <class Tables, class OfOcv>
-  constexpr SocDistribution<S> from_voltage(const Tables& tables, bool given_before, const SocDistribution<S>& before,
+  constexpr SocDistribution<S> from_voltage(const Tables& tables, const SocDistribution<S>* before,
                                             const OfOcv* reading) {
-    StartMisfit<S, Tables, OfOcv> misfit{tables, reading, given_before ? &before : nullptr};
-    const SocDistribution<S> soc = reading != nullptr ? soc_from(misfit) : before;
+    const PriorMisfit<S> prior =
+        before != nullptr ? PriorMisfit<S>(*before, WrongPrior::one_in_ten_thousand) : PriorMisfit<S>();
+    SocBank<S>& bank = ambiguous_.hypotheses();
+    bank.clear_first_misfits();
+    const SocDistribution<S> soc =
+        reading != nullptr ? StartSearch(StartMisfit<S, Tables, OfOcv>{tables, *reading}, prior).run(bank) : *before;
     const bool ambiguous = soc.variance > Variance(SocBank<S>::open_above_sigma * SocBank<S>::open_above_sigma);
-    if (!ambiguous && !given_before) return soc;
-    misfit.wrong = WrongPrior::even_odds;
-    ambiguous_.open_at(soc.soc, misfit, !ambiguous);
+    if (ambiguous || before != nullptr) ambiguous_.open_after_voltage(soc.soc, prior.with_even_odds(), !ambiguous);
     return soc;
   }
 

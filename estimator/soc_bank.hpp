@@ -52,8 +52,19 @@ class SocBank {
   /// The next step() begins a turn.
   constexpr bool begins_turn() const { return turn_ == 0; }
 
-  /// Starts. mean: present SOC of the filter; misfit(soc): initial misfit, >= 0. With the moments, so that `points`
-  /// samples pass before a reading: the error of the next one is that of the reading that the misfits are from.
+  /// Misfit of a point to the first voltage, kept until open_at(): up to 32,000, in steps of 3e-5.
+  constexpr void set_first_misfit(int k, const Exponent& misfit) {
+    misfit_[static_cast<std::size_t>(k)] = Misfit(arithmetic::product<Exponent>(misfit, Fraction(1.0 / 16)));
+  }
+  constexpr Exponent first_misfit(int k) const {
+    return Exponent(misfit_[static_cast<std::size_t>(k)] * arithmetic::Current<S>(16));
+  }
+
+  constexpr void clear_first_misfits() { misfit_ = {}; }
+
+  /// Starts. mean: present SOC of the filter; misfit(k): initial misfit of grid(k), >= 0. With the moments, so that
+  /// `points` samples pass before a reading: the error of the next one is that of the reading that the misfits are
+  /// from.
   template <class F>
   constexpr void open_at(const Soc& mean, F&& misfit) {
     open_ = true;
@@ -65,7 +76,7 @@ class SocBank {
     gain_sum_ = Sum(0);
     least_ = Misfit(2'000);
     for (int k = 0; k < points; ++k) {
-      misfit_[static_cast<std::size_t>(k)] = clamped(Misfit(misfit(grid(k))));
+      misfit_[static_cast<std::size_t>(k)] = clamped(Misfit(misfit(k)));
       if (misfit_[static_cast<std::size_t>(k)] < least_) least_ = misfit_[static_cast<std::size_t>(k)];
     }
     next_least_ = least_;
@@ -158,18 +169,18 @@ class SocBank {
     return share * Fraction(1.0 / model::persistent_error_correlations);
   }
 
+  /// Part of off_v outside of +-half_v.
+  static constexpr Voltage beyond(const Voltage& off_v, const Voltage& half_v) {
+    if (off_v > half_v) return Voltage(off_v - half_v);
+    return off_v < -half_v ? Voltage(off_v + half_v) : Voltage(0);
+  }
+
   static constexpr Soc grid(int k) { return Soc(arithmetic::Current<S>(2 * k + 1) * Fraction(0.5 / points)); }
 
  private:
   static constexpr int most = 4;  ///< largest increase of a misfit by one voltage
 
   static constexpr Misfit clamped(const Misfit& m) { return m > Misfit(200) ? Misfit(200) : m; }
-
-  /// Part of off_v outside of +-half_v.
-  static constexpr Voltage beyond(const Voltage& off_v, const Voltage& half_v) {
-    if (off_v > half_v) return Voltage(off_v - half_v);
-    return off_v < -half_v ? Voltage(off_v + half_v) : Voltage(0);
-  }
 
   constexpr void update_misfit(std::size_t k, const Fraction& share, const Variance& white_v2,
                                const Observation& observation) {

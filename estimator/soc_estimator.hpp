@@ -92,7 +92,8 @@ class SocEstimator {
       count_.lose(Variance(noise[Model::soc] - constants_.soc_noise()));
     }
     errors_.add_gain_error(noise[Model::soc], soc, cell.noise.gain);
-    state_.covariance.propagate(Model::state_transition(state_.model_state, at, discretisation, input), noise);
+    state_.covariance.template propagate<typename Model::Couples>(
+        Model::state_transition(state_.model_state, at, discretisation, input), noise);
     state_.model_state = Model::advance(state_.model_state, at, discretisation, input);
 
     const Voltage predicted_v = Model::voltage(laws, state_.model_state, at, input);
@@ -327,7 +328,7 @@ class SocEstimator {
     count_.begin(estimate.soc);
     errors_.start(estimate.soc);
     monitor_.start(cell);
-    monitor_.bank().open_at(estimate.soc, PriorMisfit<S>{{estimate.soc, anything}});
+    monitor_.bank().open_at(estimate.soc, PriorMisfit<S>({estimate.soc, anything}));
     return estimate;
   }
 

@@ -155,7 +155,7 @@ class SocMonitor {
     const Variance of_soc_v2 =
         arithmetic::product<Variance>(arithmetic::product<Variance>(variance, h[Model::soc]), h[Model::soc]);
     const Variance of_model_v2 =
-        Variance(Variance(soc_axis_variance<S>(tables, cell.noise, at, soc, innovation_v) +
+        Variance(Variance(soc_axis_variance<S>(tables, cell.noise, at, soc, innovation_v, interval) +
                           Errors::model_error_beyond_states(cell.noise)) +
                  Variance(AmbiguousSoc<S, ModelOf>::persistent_variance(cell.noise, state, h) + of_resistances_v2));
     const Variance expected_v2 = Variance(Variance(of_model_v2 + of_soc_v2) + cell.noise.voltage_v2);
@@ -180,7 +180,7 @@ class SocMonitor {
     state.covariance.template reset<Model::soc>(before.variance);
     const Variance more_v2 = arithmetic::product<Variance>(of_model_v2, Count(model_error_factor)),
                    seen_v2 = consistency_.variance();
-    bank_.open_at(soc, PriorMisfit<S>{before}, false, seen_v2 < more_v2 ? seen_v2 : more_v2);
+    bank_.open_at(soc, PriorMisfit<S>(before), false, seen_v2 < more_v2 ? seen_v2 : more_v2);
     consistency_.reset();
     consistency_.restart_scatter();
     seen_ = {};

@@ -56,11 +56,11 @@ constexpr arithmetic::Variance<S> soc_axis_variance(const model::FilterNoise<S>&
 
 /// The same for a deviation off_v of a voltage from `at` that may be large. The curve is steep over few per cent only,
 /// so its secant over three standard deviations of the axis counts, on the side of the deviation, and from empty to
-/// full. at: of `tables` at soc.
+/// full. at: of `tables` at soc, which is in `interval`.
 template <class S, class Tables>
 constexpr arithmetic::Variance<S> soc_axis_variance(const Tables& tables, const model::FilterNoise<S>& noise,
                                                     const model::TablePoint<S>& at, const arithmetic::Soc<S>& soc,
-                                                    const arithmetic::Voltage<S>& off_v) {
+                                                    const arithmetic::Voltage<S>& off_v, std::uint8_t interval) {
   using namespace arithmetic;
   constexpr double sigmas = 3;
   const bool below = off_v < Voltage<S>(0);
@@ -68,7 +68,6 @@ constexpr arithmetic::Variance<S> soc_axis_variance(const Tables& tables, const 
   if (below ? !(soc > end) : !(soc < end)) return Variance<S>{};
   Soc<S> there = below ? Soc<S>(soc - three) : Soc<S>(soc + three);
   if (below ? there < end : there > end) there = end;
-  std::uint8_t interval = 0;
   const Voltage<S> sigma_v = Voltage<S>(look_up(tables, there, interval).ocv_v - at.ocv_v) * Fraction<S>(1 / sigmas);
   return sigma_v * sigma_v;
 }

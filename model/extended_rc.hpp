@@ -180,6 +180,12 @@ struct ExtendedRc {
       return sum;
     }
 
+    /// Whether the transition of state i may depend on a later state k.
+    struct Couples {
+      static constexpr bool of(std::size_t i, std::size_t k) {
+        return (i == 0 && k == soc) || (Errors && i == soc && k == last);
+      }
+    };
     static constexpr StateTransition state_transition(const State& x, const TablePoint<S>& at,
                                                       const Discretisation& discretisation, const StepInput<S>& input) {
       const auto base = Base::state_transition({x[0]}, at, discretisation.rc, input);

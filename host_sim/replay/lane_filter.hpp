@@ -44,7 +44,8 @@ class LaneFilter {
     const auto discretisation = Model::discretise(laws, next.model_state, at, input);
     auto noise = Model::noise(laws, discretisation, cells.noise);
     noise[Model::soc] = constants_.soc_noise;
-    next.covariance.propagate(Model::state_transition(next.model_state, at, discretisation, input), noise);
+    next.covariance.template propagate<typename Model::Couples>(
+        Model::state_transition(next.model_state, at, discretisation, input), noise);
     next.model_state = Model::advance(next.model_state, at, discretisation, input);
 
     const S predicted_v = Model::voltage(laws, next.model_state, at, input),

@@ -21,7 +21,7 @@ struct Restart {
     constants.set_time_step(cell.noise, 1'000'000);
     constants.set_temperature(cell, 2'500);
     const SocDistribution<double> before{soc, 0.3 * 0.3};
-    ambiguous.open_at(soc, PriorMisfit<double>{before});
+    ambiguous.open_at(soc, PriorMisfit<double>(before));
   }
   /// One second at rest; the voltage is the OCV at true_soc.
   void second(double true_soc) {
@@ -58,7 +58,7 @@ TEST(AmbiguousSoc, StaysOpenOnThePlateau) {
 TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
   Restart r(0.5);
   const SocDistribution<double> before{0.5, 0.3 * 0.3};
-  r.ambiguous.open_at(0.5, PriorMisfit<double>{before}, false, 100);
+  r.ambiguous.open_at(0.5, PriorMisfit<double>(before), false, 100);
   for (int k = 0; k < 1'800; ++k) r.second(0.05);
   EXPECT_TRUE(r.ambiguous.open());
   for (int k = 0; k < 4 * 3'600 && r.ambiguous.open(); ++k) r.second(0.05);
@@ -70,8 +70,9 @@ TEST(AmbiguousSoc, ALargeDeviationFromBeforePasses) {
 TEST(AmbiguousSoc, TakesOverFromTheFilterWhenTheSocIsMoreProbablyElsewhere) {
   const auto takes_over = [](double others) {
     Restart r(0.5);
-    const auto misfit = [&](double soc, double, std::uint8_t&) { return std::abs(soc - 0.5) < 0.05 ? 0 : others; };
-    r.ambiguous.open_at(0.5, misfit, true, 100);  // the model was off by volts: no voltage says anything
+    r.ambiguous.open_at(0.5, PriorMisfit<double>(), true, 100);  // the model was off by volts: no voltage says anything
+    r.ambiguous.hypotheses().open_at(
+        0.5, [&](int k) { return std::abs(SocBank<double>::grid(k) - 0.5) < 0.05 ? 0 : others; });
     for (int k = 0; k < 128; ++k) r.second(0.5);
     return !r.ambiguous.in_background();
   };
@@ -85,7 +86,7 @@ TEST(AmbiguousSoc, AStartThatNoVoltageContradictsStays) {
     for (const double sigma : {0.01, 0.02, 0.028}) {
       Restart r(soc);
       const SocDistribution<double> before{soc, sigma * sigma};
-      const PriorMisfit<double> misfit{before, WrongPrior::even_odds};
+      const PriorMisfit<double> misfit(before, WrongPrior::even_odds);
       r.ambiguous.open_at(soc, misfit, true, 100);  // the model was off by volts: no voltage says anything
       for (int k = 0; k < 300; ++k) r.second(soc);
       EXPECT_TRUE(r.ambiguous.in_background() || !r.ambiguous.open()) << soc << ", " << sigma;

@@ -42,7 +42,7 @@ struct Asked {
 template <class S>
 Asked<S> asked() {
   Asked<S> a;
-  a.bank.open_at(arithmetic::Soc<S>(0.5), [](const arithmetic::Soc<S>&) { return arithmetic::Exponent<S>(0); });
+  a.bank.open_at(arithmetic::Soc<S>(0.5), [](int) { return arithmetic::Exponent<S>(0); });
   return a;
 }
 
@@ -57,8 +57,8 @@ TYPED_TEST(SocBankOfEveryScalar, SaysHowProbablyTheSocIsElsewhere) {
   using S = TypeParam;
   const auto elsewhere = [](double others, double moved) {
     SocBank<S> bank;
-    bank.open_at(arithmetic::Soc<S>(0.5), [&](const arithmetic::Soc<S>& there) {
-      return arithmetic::Exponent<S>(std::abs(arithmetic::as_double(there) - 0.5) < 0.05 ? 0 : others);
+    bank.open_at(arithmetic::Soc<S>(0.5), [&](int k) {
+      return arithmetic::Exponent<S>(std::abs(arithmetic::as_double(SocBank<S>::grid(k)) - 0.5) < 0.05 ? 0 : others);
     });
     bank.follow(arithmetic::Soc<S>(moved));
     double probability = -1;

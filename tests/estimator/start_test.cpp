@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "tests/cells.hpp"
@@ -19,7 +20,10 @@ auto read(const Cell& cell, const V& ocv_v, double sigma_v) {
   using S = typename Cell::Scalar;
   const auto variance_v2 = arithmetic::Variance<S>(sigma_v * sigma_v);
   const OcvReading<S> reading{ocv_v, variance_v2, variance_v2};
-  return soc_from(StartMisfit<S, Cell>{cell, &reading, nullptr});
+  SocBank<S> bank;
+  const StartMisfit<S, Cell, OcvReading<S>> misfit{cell, reading};
+  const PriorMisfit<S> none;
+  return StartSearch(misfit, none).run(bank);
 }
 
 template <class S>
@@ -58,6 +62,36 @@ TYPED_TEST(StartOfEveryScalar, HoldsTheTruthWithinTwoSigmaOnTheWholeCurve) {
 TYPED_TEST(StartOfEveryScalar, AVoltageOutsideTheCurveIsItsEnd) {
   EXPECT_GT((start<TypeParam>(3.65, 0.005).first), 0.98);
   EXPECT_LT((start<TypeParam>(2.2, 0.005).first), 0.02);
+}
+
+/// Every SOC weighted by how well its OCV fits, in steps of 1/8,192.
+std::pair<double, double> weighted_everywhere(double voltage_v, double sigma_v) {
+  const auto cell = tests::prepared<double>();
+  double weights = 0, first = 0, second = 0;
+  for (double soc = 0.5 / 8'192; soc < 1; soc += 1.0 / 8'192) {
+    const double ocv_v = model::look_up(cell, soc).ocv_v, off_v = voltage_v - ocv_v, axis = 3 * cell.noise.soc_axis,
+                 there = off_v < 0 ? std::max(0.0, soc - axis) : std::min(1.0, soc + axis),
+                 axis_v = (model::look_up(cell, there).ocv_v - ocv_v) / 3,
+                 weight = std::exp(-off_v * off_v / (2 * (sigma_v * sigma_v + axis_v * axis_v)));
+    weights += weight;
+    first += weight * soc;
+    second += weight * soc * soc;
+  }
+  const double mean = first / weights;
+  return {mean, std::sqrt(second / weights - mean * mean)};
+}
+
+TYPED_TEST(StartOfEveryScalar, IsThatOfManyPoints) {
+  const auto cell = tests::prepared<double>();
+  for (const double sigma_v : {0.005, 0.01, 0.05}) {
+    for (double soc = 0.005; soc < 1; soc += 0.005) {
+      const double voltage_v = model::look_up(cell, soc).ocv_v;
+      const auto [found, sigma] = start<TypeParam>(voltage_v, sigma_v);
+      const auto [mean, deviation] = weighted_everywhere(voltage_v, sigma_v);
+      EXPECT_NEAR(found, mean, 0.25 * sigma) << "at soc " << soc << ", " << sigma_v << " V";
+      EXPECT_NEAR(sigma, deviation, 0.004 + 0.1 * deviation) << "at soc " << soc << ", " << sigma_v << " V";
+    }
+  }
 }
 
 }  // namespace

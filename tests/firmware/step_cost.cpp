@@ -75,7 +75,8 @@ Footprint footprint(const std::filesystem::path& application_image) {
       ".*bms::(firmware::estimator_step\\(|estimator::SocEstimator<|firmware::BoardCell::update_condition\\(|estimator:"
       ":Condition<|"
       "estimator::current_"
-      "limits<|estimator::soc_from<|estimator::SocBank<|estimator::StartMisfit<|arithmetic::|model::|estimator::"
+      "limits<|estimator::StartSearch<|estimator::SocSums<|estimator::PriorMisfit<|estimator::SocBank<|estimator::"
+      "StartMisfit<|arithmetic::|model::|estimator::"
       "UdCovariance<|"
       "estimator::InputCheck).*");
   for (const Symbol& s : symbols) {
