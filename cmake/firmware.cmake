@@ -196,6 +196,8 @@ endif()
 set(cell_header_scalar "")
 if(fixed_point)
   set(cell_header_scalar fixed)
+elseif(BMS_PARALLEL)
+  set(cell_header_scalar aged)
 endif()
 add_custom_command(OUTPUT ${cell_header}
   COMMAND ${cell_header_tool} ${BMS_CELL} ${cell_header} ${cell_header_scalar}

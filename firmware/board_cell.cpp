@@ -29,9 +29,10 @@ void BoardCell::update_cells(estimator::PackCells<BoardScalar, cells>& differenc
 std::int32_t BoardCell::open_circuit_uv(const Estimator& estimator, const measurement::Sample& mean,
                                         const Estimator::Result& estimate) {
   // Else the estimator takes the drop of an aged battery for a lower charge (firmware/parallel/README.md).
-  static_assert(!hal::has_group_bus || generated::parameters.tolerance.resistance_fraction >= 0.5,
-                "batteries of a group (BMS_PARALLEL) have up to twice the resistance of the cell file: state "
-                "tolerance.resistance_fraction of at least 0.5 in it");
+  static_assert(
+      !hal::has_group_bus || generated::parameters.tolerance.resistance_fraction >= 0.5,
+      "batteries of a group (BMS_PARALLEL) have up to twice the resistance of the cell file: cell_header needs "
+      "`aged`");
   if constexpr (hal::has_group_bus) {
     const std::int32_t uv = estimator::open_circuit_uv(tables(), mean, estimate, estimator);
     if (uv != measurement::no_reading) return static_cast<std::int32_t>(cells) * uv;
