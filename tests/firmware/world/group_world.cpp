@@ -75,9 +75,8 @@ const Pack& parallel_pack(const std::string& vehicle_profile) {
   const Pack pack = [&] {
     files::CellFile cell = files::read_cell("table9");
     cell.parameters = tests::of_capacity(cell.parameters, truck_ah);
-    cell.parameters.tolerance.resistance_fraction = 0.5;  // firmware/parallel/README.md
-    cell.name = "table9_100ah_aged";
-    cell.source = "table9 with the capacity of 100 Ah, and resistances of an aged battery";
+    cell.name = "table9_100ah";
+    cell.source = "table9 with the capacity of 100 Ah";
     cell = files::parse_cell(files::cell_text(cell), cell.name);
     return Pack{truck_ah, cell.parameters.limits.discharge_current_max_a, 24,
                 images::chosen_image("stm32f405_80v", cell,
