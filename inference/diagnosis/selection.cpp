@@ -62,8 +62,7 @@ class Elimination {
         likelihood_(likelihood),
         control_(control),
         scope_(scope),
-        error_v_(plain_error_v(likelihood, likelihood.base())),
-        one_current_(likelihood.facts().one_current) {
+        error_v_(plain_error_v(likelihood, likelihood.base())) {
     found_.best = grown;
   }
 
@@ -161,7 +160,7 @@ class Elimination {
   bool is_credible(const HypothesisFit& f, std::size_t m) const {
     return scope_.expected.contains(m) ||
            (!is_weak(f, m, scope_.expected) && !is_implausible(f, m, likelihood_.facts()) &&
-            !(one_current_ && is_at_the_end(f, m, likelihood_.records())));
+            !(likelihood_.facts().one_current && is_at_the_end(f, m, likelihood_.records())));
   }
 
   /// The rounds are limited, and end with mechanisms that may not stay: those without a strength of their own. Of two
@@ -206,7 +205,7 @@ class Elimination {
 
   /// Returns true if what a slow cause explains next to a contact, at one current, is no more than it may wander.
   bool is_within_wander(std::size_t m, const HypothesisFit& without, const std::map<std::size_t, double>& rms_v) const {
-    if (!one_current_ || scope_.expected.contains(m) || could_be_contact(m) || is_intermittent(m) ||
+    if (!likelihood_.facts().one_current || scope_.expected.contains(m) || could_be_contact(m) || is_intermittent(m) ||
         model::catalogue[m].domain != model::Domain::physics)
       return false;
     double resistance_v = 0;
@@ -274,7 +273,6 @@ class Elimination {
   const HypothesisFit& control_;
   const Scope& scope_;
   double error_v_;
-  bool one_current_;
   Survivors found_;  ///< its best is the current hypothesis
 };
 
